@@ -31,8 +31,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from benchmarks.l_shape import Reference, reach, scene, write_foot
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
-from patchlaw.multiscale import run
-from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale import make_setup, run
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.style import colour_bar, map_axes
 

@@ -42,12 +42,9 @@ def measure(unknowns, *, solves):
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from patchlaw.geometry import PatchGrid
-    from patchlaw.geometry.rigid_plane import Control
-    from patchlaw.macro import LawContactProblem, LoadedFace
+    from patchlaw.geometry import Control, PatchGrid
+    from patchlaw.macro import LawContactProblem, LoadedFace, contact_facets, planar_face
     from patchlaw.macro.linear_solvers import selection
-    from patchlaw.macro.mesh.contact_face import contact_facets
-    from patchlaw.macro.mesh.tagged import planar_face
 
     selection.FACTORISED_VERTICES = 0  # as on large bodies
     part, *rest = PARTS["pad, P2"]

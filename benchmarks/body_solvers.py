@@ -29,13 +29,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from json_rows import keep
 from machine_parts import STEEL, Part, part_body, read_part
 
-from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import LawContactProblem, LoadedFace, Material, compat
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.macro import (
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    compat,
+    contact_facets,
+    planar_face,
+    read_mesh,
+)
 from patchlaw.macro.linear_solvers.options import PREFIX
-from patchlaw.macro.mesh.contact_face import contact_facets
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.macro.mesh.tagged import planar_face
 
 COMM = MPI.COMM_WORLD
 LINING, SOFT, RUBBERY = (

@@ -37,9 +37,8 @@ def solve(grid, shortest, periodic, load, extended, sides):
     """Solve one contact; return what it took."""
     sys.path.insert(0, str(ROOT))
     from patchlaw.geometry import Control, Spectrum, Surface, synthesise
-    from patchlaw.micro import HalfSpaceModel
+    from patchlaw.micro import FreeSides, HalfSpaceModel
     from patchlaw.micro.boundary_elements import half_space_grid
-    from patchlaw.micro.boundary_elements.free_sides import FreeSides
 
     if not extended:
         half_space_grid._MANY = 10**12

@@ -20,9 +20,8 @@ from mpi4py import MPI
 from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, HalfSpaceModel
-from patchlaw.multiscale import LoadHistory, PatchContact, Problem, consistent_laws
+from patchlaw.multiscale import CellContact, LoadHistory, PatchContact, Problem, consistent_laws
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
-from patchlaw.multiscale.models.cell_contact import CellContact
 
 REPEATS = 5
 APPROACH = 8e-3

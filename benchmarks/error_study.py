@@ -36,8 +36,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from patchlaw import InputError, NotConverged
-from patchlaw.geometry import Spectrum, Surface, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.models.measured_errors.contact import _Problems

@@ -21,12 +21,10 @@ from collections import Counter
 from json_rows import keep
 
 from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
-from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.laws.of_samples import representative_law
+from patchlaw.multiscale import Scene, representative_law, run
 
 PAPER = Scene.load("demos/scenes/paper.toml").with_(
     {

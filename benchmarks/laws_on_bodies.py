@@ -37,14 +37,19 @@ from helpers.body_meshes import HIGH, LOW, box
 from json_rows import keep
 from machine_parts import STEEL, part_body, read_part
 
-from patchlaw.geometry import Friction, PatchGrid, ShearControl
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
+from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
+from patchlaw.macro import (
+    FacePair,
+    LawContactProblem,
+    LoadedFace,
+    MeshedBody,
+    Support,
+    contact_facets,
+    planar_face,
+    read_mesh,
+)
 from patchlaw.macro.contact.newton import ContactPreconditioner
-from patchlaw.macro.mesh.contact_face import contact_facets
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.macro.mesh.tagged import planar_face
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 PRESSURE = 10.0  # of the whole load, on average [MPa]
 

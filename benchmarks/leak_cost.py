@@ -8,7 +8,7 @@ count, as the machine may do other things. Run from the project's root; it takes
 
 import time
 
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flows
 from patchlaw.multiscale import representative_law

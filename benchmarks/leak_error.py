@@ -16,8 +16,7 @@ from itertools import pairwise, product
 import numpy as np
 from scipy.special import stdtrit
 
-from patchlaw.geometry import Control
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity

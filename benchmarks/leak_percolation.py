@@ -11,7 +11,7 @@ root; it takes two minutes:
 
 import numpy as np
 
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import cell_network, gap_flow
 

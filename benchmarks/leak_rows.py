@@ -8,8 +8,7 @@ the project's root; it takes two minutes:
 
 import numpy as np
 
-from patchlaw.geometry import Control
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale.laws.transmissivity import sample_transmissivity

@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 from helpers.mesh_files import gmsh_session
 
-from patchlaw.macro import Material, MeshedBody, Support
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.support.parallel import on_root
+from patchlaw.macro import Material, MeshedBody, Support, read_mesh
+from patchlaw.support import on_root
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 

@@ -52,11 +52,11 @@ from patchlaw.macro import (
     MeshedBody,
     Support,
     compat,
+    contact_facets,
     joined_meshes,
+    planar_face,
 )
-from patchlaw.macro.mesh.contact_face import contact_facets
-from patchlaw.macro.mesh.tagged import planar_face
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 COMM = MPI.COMM_WORLD
 SIDES = (20.0, 10.0, 5.0)

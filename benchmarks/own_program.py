@@ -7,7 +7,7 @@ from helpers.user_problems import elastic
 
 from benchmarks.twin_scenes import scene_of, written
 from patchlaw import ContactProblem, Control, Interface, vector_space
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import Friction
 from patchlaw.macro import read_mesh
 from patchlaw.multiscale import Run
 

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 from helpers.mesh_files import gmsh_session
 
+from patchlaw.geometry import Control
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
-from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import (
     LawContactProblem,
     LoadedFace,
@@ -23,10 +23,11 @@ from patchlaw.macro import (
     Support,
     TaggedMesh,
     contact_facets,
+    planar_face,
 )
 from patchlaw.macro.compat import mesh_from_cells
 from patchlaw.macro.mesh.from_file import refined
-from patchlaw.macro.mesh.tagged import cell_tags, facet_tags, planar_face
+from patchlaw.macro.mesh.tagged import cell_tags, facet_tags
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe
 

@@ -31,8 +31,8 @@ from patchlaw.geometry import (
 )
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.multiscale import extrapolated
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
-from patchlaw.multiscale.results.accuracy import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 4.0

@@ -46,8 +46,7 @@ def measure(choice: argparse.Namespace) -> None:
     from mpi4py import MPI
 
     import patchlaw.macro.bodies  # noqa: F401 imports are no part of the times
-    from patchlaw.multiscale import Scene, consistent_laws
-    from patchlaw.multiscale.runs.scene_run import Run
+    from patchlaw.multiscale import Run, Scene, consistent_laws
 
     comm = MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
     times = {}

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from patchlaw.geometry import RefinedShape
 from patchlaw.macro import TaggedMesh
 from patchlaw.macro.mesh.block import move_onto
-from patchlaw.support.parallel import on_root
+from patchlaw.support import on_root
 
 ROUGH = "rough"
 """Name of the contact face."""

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchlaw.multiscale import Scene
+from patchlaw.multiscale import Scene, compare
 from patchlaw.multiscale.results.figures.style import (
     COLOURS,
     ERROR_BAND,
@@ -27,7 +27,6 @@ from patchlaw.multiscale.results.figures.style import (
     new_figure,
     use_style,
 )
-from patchlaw.multiscale.runs.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -21,8 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.geometry import Control
-from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.models.patch_contact import PatchContact
+from patchlaw.multiscale import PatchContact, Scene, make_setup, run
 from patchlaw.multiscale.results.figures.style import COLOURS, FULL_WIDTH, new_figure, use_style
 
 parser = argparse.ArgumentParser()

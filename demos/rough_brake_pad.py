@@ -25,8 +25,8 @@ from pad.chip import write_chip
 from pad.maps import deliver, rough
 from pad.picture import draw, pressures
 
-from patchlaw.geometry import Control, Surface, mirrored, read_surface
-from patchlaw.geometry.preparation import Filter, Preparation, prepared
+from patchlaw.geometry import Control, Filter, Preparation, Surface, mirrored, read_surface
+from patchlaw.geometry.preparation import prepared
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, export_laws, run
 

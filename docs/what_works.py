@@ -22,11 +22,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.setup import trial_coupling
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 PAGE = Path(__file__).with_suffix(".md")
 

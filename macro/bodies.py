@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 from dolfinx import fem
 
-from patchlaw.geometry.materials import Material
+from patchlaw.geometry import Material
 from patchlaw.macro.elastic_body import ElasticBody, Held
 from patchlaw.macro.linear_solvers.multigrid import Lattice, lattice_of
 from patchlaw.macro.mesh.block import FLAT, BlockMesh

@@ -16,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_array, vstack
 
-from patchlaw.geometry.materials import Material
+from patchlaw.geometry import Material
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.multigrid import Lattice
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, assemble_symmetric

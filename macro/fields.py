@@ -21,8 +21,8 @@ import numpy as np
 from dolfinx import fem, io
 from scipy.sparse import csr_array
 
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.materials import von_mises
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_pair import FacePair

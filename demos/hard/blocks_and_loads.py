@@ -9,14 +9,13 @@ from hard.bench import Count, case, lawless, off, scene, solved
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import BlockShape, Control, PatchGrid
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.micro import influence_matrix
-from patchlaw.multiscale import make_setup
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale import PatchContact, PatchLaw, PatchLaws, make_setup
+from patchlaw.multiscale.laws.patch_law import repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.models.patch_contact import PatchContact, equilibrium
+from patchlaw.multiscale.models.patch_contact import equilibrium
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}

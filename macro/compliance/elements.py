@@ -21,8 +21,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from scipy import linalg
 
+from patchlaw.geometry import Material
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
-from patchlaw.geometry.materials import Material
 from patchlaw.support import Array, Indices, NotConverged
 
 _MORE = 6

@@ -27,8 +27,8 @@ from dolfinx import fem
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from patchlaw.geometry import Material
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.materials import Material
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import MeshedBody
 from patchlaw.macro.compliance.face_compliance import FaceCompliance, reciprocal, stresses_in_face

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry import RigidPlane
 from patchlaw.macro.contact.loaded_face import ContactFace
 from patchlaw.support import Array, Indices, NotBalanced
 

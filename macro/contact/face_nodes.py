@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.rough_face import RoughFace
 from patchlaw.macro.mesh.facet_parts import triangle_areas

@@ -12,7 +12,7 @@ import ufl
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from patchlaw.geometry.materials import Material
+from patchlaw.geometry import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode

@@ -14,7 +14,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.mesh.facets import facet_nodes

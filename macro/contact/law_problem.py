@@ -19,9 +19,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl, way_of_approach
+from patchlaw.geometry import Control, Friction, RigidPlane, ShearControl
+from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction

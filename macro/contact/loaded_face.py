@@ -15,8 +15,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, identity, kron
 
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.meshes.block import require_inside
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
 from patchlaw.macro.contact.face_laws import Sampling

@@ -15,7 +15,7 @@ import numpy as np
 from dolfinx import fem
 from scipy.spatial import cKDTree
 
-from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block, MeshedBody
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium

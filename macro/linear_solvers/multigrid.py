@@ -21,7 +21,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 
-from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.compat import call
 from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements

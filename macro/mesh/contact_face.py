@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from dolfinx import fem
 
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.geometry.legendre_modes import gauss_rule
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.block import TOP, BlockMesh
 from patchlaw.macro.mesh.facet_parts import (

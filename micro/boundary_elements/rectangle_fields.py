@@ -40,8 +40,8 @@ from typing import Any
 
 import numpy as np
 
+from patchlaw.geometry import Material
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
-from patchlaw.geometry.materials import Material
 from patchlaw.micro.boundary_elements.body_modes import half_space_traction_modes
 from patchlaw.micro.boundary_elements.rectangle_modes import (
     half_space_modes,

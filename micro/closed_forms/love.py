@@ -30,8 +30,8 @@ import scipy
 from numpy.typing import ArrayLike
 from scipy import fft
 
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.support import Array
 
 

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.geometry import Control
-from patchlaw.geometry.contact_state import ContactState, ShearState, sum_of
+from patchlaw.geometry import Control, ShearState
+from patchlaw.geometry.contact_state import ContactState, sum_of
 from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
 from patchlaw.micro.half_space.model import HalfSpaceModel

@@ -27,7 +27,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import fft
 
-from patchlaw.geometry.materials import MaterialPair
+from patchlaw.geometry import MaterialPair
 from patchlaw.micro.boundary_elements.body_modes import TractionsOnCells
 from patchlaw.micro.boundary_elements.half_space_grid import (
     Cells,

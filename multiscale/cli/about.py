@@ -366,8 +366,7 @@ def _use_all_forms(element: str) -> None:
     """Do on a tiny block whatever compiles a form: make its problems and write its fields."""
     from mpi4py import MPI
 
-    from patchlaw.geometry.meshes.block import BlockShape
-    from patchlaw.geometry.patches import PatchGrid
+    from patchlaw.geometry import BlockShape, PatchGrid
     from patchlaw.macro import (
         Block,
         FieldStep,

@@ -301,7 +301,7 @@ def _run(words: list[str]) -> int:
         return 0
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
-    from patchlaw.support.errors import NotInstalled
+    from patchlaw.support import NotInstalled
     from patchlaw.support.packages import conflict, optional_packages
 
     try:

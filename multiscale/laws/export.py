@@ -26,8 +26,8 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.geometry import Regions
-from patchlaw.geometry.spring_bed import Coefficient, Friction, stiffness_ratios
+from patchlaw.geometry import Friction, Regions
+from patchlaw.geometry.spring_bed import Coefficient, stiffness_ratios
 from patchlaw.multiscale.laws import FORMATS
 from patchlaw.multiscale.laws.law_module import law_modules
 from patchlaw.multiscale.laws.law_table import LawTable

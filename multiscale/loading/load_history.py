@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import ShearControl
 from patchlaw.geometry.surface import FIRST_TOUCH, Zero
 from patchlaw.multiscale.loading.path import (
     Distances,

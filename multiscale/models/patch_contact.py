@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.rigid_plane import UNSUPPORTED, plane_failure
-from patchlaw.micro.model import NormalStiffness
+from patchlaw.micro import NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import Displacements

@@ -19,7 +19,7 @@ import numpy as np
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.surface import FIRST_TOUCH
-from patchlaw.micro.model import NormalStiffness, Stiffness
+from patchlaw.micro import NormalStiffness, Stiffness
 from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.path import Path as LoadPath

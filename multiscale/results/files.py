@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from patchlaw.geometry.patches import PatchGrid, Regions
+from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.loading.column import (
     MODE_COLUMNS,
     RENAMED,

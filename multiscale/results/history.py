@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.geometry.patches import PatchGrid, Regions
+from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, column, span

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from patchlaw.geometry.contact_state import stacked
+from patchlaw.geometry import stacked
 from patchlaw.micro import press_along
 
 

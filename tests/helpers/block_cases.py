@@ -6,8 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from helpers.contact_laws import PowerLaw
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh
 
 

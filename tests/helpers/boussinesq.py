@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.micro.closed_forms.love import corner_integral
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 Array = NDArray[np.float64]
 

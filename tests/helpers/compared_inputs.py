@@ -9,13 +9,12 @@ import numpy as np
 from hypothesis import strategies as st
 
 from helpers.scene_inputs import scenes, takes_long
+from patchlaw.multiscale import Scene, compare
 from patchlaw.multiscale.cli.studies import comparison_html
 from patchlaw.multiscale.results.files import table_files
 from patchlaw.multiscale.runs import AGAINST, comparison
 from patchlaw.multiscale.runs.cases import CaseResult
-from patchlaw.multiscale.runs.comparison import compare
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "not started")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)

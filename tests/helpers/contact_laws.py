@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 class Spring:

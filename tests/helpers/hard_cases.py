@@ -4,8 +4,7 @@ from copy import deepcopy
 
 import numpy as np
 
-from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.models.patch_contact import PatchContact
+from patchlaw.multiscale import PatchContact, Scene, make_setup, run
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")
 BASE = {

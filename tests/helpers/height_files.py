@@ -6,8 +6,8 @@ import pickle
 import numpy as np
 from hypothesis import strategies as st
 
-from patchlaw.geometry.files.reading import read_surface
-from patchlaw.support.errors import InputError
+from patchlaw.geometry import read_surface
+from patchlaw.support import InputError
 
 DTYPES = "f8 f4 f2 >f8 <i4 >i2 u1 i8 u8 ? c16 c8 S3 U3 O M8[s] m8[s] V4 f8,i4 g".split()
 SHAPES = [(), (0,), (16,), (4, 4), (5, 7), (4, 1), (1, 9), (3, 3), (0, 5), (4, 4, 4), (1, 4, 4)]

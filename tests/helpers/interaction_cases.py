@@ -6,29 +6,37 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
-from patchlaw.geometry import Asperities, Material, PatchGrid, find_asperities, patch_means
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import (
+    Asperities,
+    Material,
+    PatchGrid,
+    Spectrum,
+    find_asperities,
+    patch_means,
+    synthesise,
+)
 
 E_STAR = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 PATCHES = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
 
 
-def summits(x, y, *, z=0.0, major=0.1, minor=None, angle=0.0):
-    """Build asperities on a square of 1 mm from scalars or arrays; first touch at z = 0."""
+def summits(x, y, *, z=0.0, major=0.1, minor=None, angle=0.0, highest=0.0):
+    """Build asperities on a square of 1 mm from scalars or arrays; None: the top is the highest."""
     x = np.atleast_1d(np.asarray(x, float))
 
     def full(value):
         return np.broadcast_to(np.asarray(value, float), x.shape)
 
+    heights = full(z)
     return Asperities(
         x=x,
         y=full(y),
-        z=full(z),
+        z=heights,
         radius_major=full(major),
         radius_minor=full(major if minor is None else minor),
         angle=full(angle),
         lengths=(1.0, 1.0),
-        highest=0.0,
+        highest=float(heights.max(initial=-np.inf) if highest is None else highest),
         mean_height=-0.02,
     )
 

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 from dolfinx import mesh as dmesh
 
-from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.macro import TaggedMesh
 
 KINDS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 9: 6, 11: 10}
 """Nodes of gmsh's kinds: triangle, square, tetrahedron, hexahedron, prism, 6 and 10 nodes."""

@@ -2,8 +2,7 @@
 
 from mpi4py import MPI
 
-from patchlaw.geometry import RefinedShape, places_in_reach
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, RefinedShape, places_in_reach
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 
 LOW = 0.01

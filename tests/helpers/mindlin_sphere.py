@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,9 +5,9 @@ import re
 from hypothesis import strategies as st
 
 from helpers.scene_inputs import BASE, put
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene.schema import scene_keys
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.quantities import _UNITS, parse_quantity
 
 _LONG = 5  # letters of a name in which one wrong letter leaves no doubt

@@ -9,11 +9,9 @@ from functools import cache
 import numpy as np
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.runs.scene_run import run
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.scene.schema import scene_keys, scene_schema
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 WHOLE = (0, -1, 1, 2, 3, 4, 5, 7, 8, 10**3, 10**6, 10**9, 10**18, 2**63, 2**64, 10**43, 10**400)
 BROKEN = (

@@ -6,11 +6,9 @@ import h5py
 import numpy as np
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.laws.law_table import read_laws, write_laws
+from patchlaw.multiscale import Run, Scene, read_laws, write_laws
 from patchlaw.multiscale.runs.output.results_folder import checkpoint_of, read_checkpoint
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.files import checksum_hdf5, write_record
 
 ODD = (

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from helpers.contact_laws import PowerLaw, RangedLaw  # noqa: F401
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.macro import TaggedMesh, compat
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.macro import compat
+from patchlaw.macro import compat, planar_face, read_mesh
 from patchlaw.macro.mesh.facets import facet_nodes
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.macro.mesh.tagged import planar_face, surface_area
+from patchlaw.macro.mesh.tagged import surface_area
 from patchlaw.multiscale import Scene, run
 
 BODIES = Path(__file__).parents[2] / "demos" / "bodies"

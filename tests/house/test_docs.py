@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.laws.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE
 from patchlaw.multiscale.runs.output.results import FILES
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import scene_keys
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
-from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.support.parallel import cores
+from patchlaw.multiscale import CellContact
+from patchlaw.support import cores
 
 COMM = MPI.COMM_WORLD
 

@@ -12,10 +12,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.block_cases import block_of, interface_of, uneven_laws
 from helpers.contact_laws import PowerLaw
 
-from patchlaw.geometry import BlockShape, Material, PatchGrid
+from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, RefinedShape
 from patchlaw.geometry.face_frame import UPWARD
-from patchlaw.geometry.meshes.refined_block import RefinedShape
-from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import (
     BOTTOM,
     TOP,
@@ -28,7 +26,7 @@ from patchlaw.macro import (
 )
 from patchlaw.macro.compliance.mesh_face import FaceMoments, mesh_face_tractions
 from patchlaw.micro import RectangleFields
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 COMM = MPI.COMM_WORLD
 SHAPES = {

@@ -11,9 +11,8 @@ from helpers.user_problems import BOTTOM, HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, b
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from patchlaw.geometry import BlockShape, Control
 from patchlaw.geometry.face_frame import UPWARD
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import (
     Block,
     LawContactProblem,

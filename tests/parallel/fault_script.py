@@ -10,9 +10,9 @@ from itertools import count
 
 from mpi4py import MPI
 
+from patchlaw.multiscale import PatchContact
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.models.patch_contact import PatchContact
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 command = import_module("patchlaw.multiscale.cli.run")
 run = import_module("patchlaw.multiscale.runs.scene_run")

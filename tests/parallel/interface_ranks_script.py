@@ -35,10 +35,7 @@ from helpers.user_problems import (
     work,
 )
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import BlockShape, Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.macro import (
     Block,
     ContactProblem,
@@ -50,7 +47,7 @@ from patchlaw.macro import (
     compat,
     joined_meshes,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 COMM = MPI.COMM_WORLD
 CONTROLS = {

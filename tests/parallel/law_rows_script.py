@@ -11,9 +11,8 @@ from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
+from patchlaw.multiscale import consistent_laws, representative_laws
 from patchlaw.multiscale.laws.law_table import law_bytes
-from patchlaw.multiscale.laws.of_patches import consistent_laws
-from patchlaw.multiscale.laws.of_samples import representative_laws
 
 COMM = MPI.COMM_WORLD
 

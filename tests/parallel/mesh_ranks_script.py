@@ -13,9 +13,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.mesh_facts import cells_of, faces_of, measures_of
 
 from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, RoughFace, block_mesh, compat
 from patchlaw.macro.contact.face_nodes import TopNodes
-from patchlaw.macro.contact.rough_face import RoughFace
 
 COMM = MPI.COMM_WORLD
 WIDE = {"margin": 0.4, "margin_cells": 2, "margin_grading": 3.0, "grading": 5.0}

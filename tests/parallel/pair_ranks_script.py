@@ -7,8 +7,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import FacePair, LawContactProblem, Material, Support
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

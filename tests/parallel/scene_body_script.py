@@ -7,8 +7,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-from patchlaw.multiscale import Scene
-from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.multiscale import Run, Scene
 
 SURFACE = {
     "spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3},

@@ -15,14 +15,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.mesh_files import tagged_box, write_boxes, write_msh2
 
-from patchlaw.macro import compat
+from patchlaw.macro import TaggedMesh, compat, planar_face, read_mesh, write_mesh
 from patchlaw.macro.mesh.facets import parts
-from patchlaw.macro.mesh.from_file import check_cells, read_mesh
+from patchlaw.macro.mesh.from_file import check_cells
 from patchlaw.macro.mesh.supports import free_motions
-from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
-from patchlaw.macro.mesh.xdmf import write_mesh
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import InputError, on_root
 
 COMM = MPI.COMM_WORLD
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -15,8 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.user_problems import PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry import BlockShape, Control, RigidPlane
 from patchlaw.macro import (
     BOTTOM,
     Block,

@@ -7,7 +7,7 @@ from helpers.contact_laws import PowerLaw
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control
 from patchlaw.macro import LawContactProblem
 
 MODES = ["patchwise", "pointwise"]

@@ -7,10 +7,9 @@ from helpers.contact_laws import PowerLaw
 from petsc4py import PETSc
 from scipy.optimize import root
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import LawContactProblem, LoadedFace
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 MODES = ["patchwise", "pointwise"]
 HALF = 0.5 * np.sqrt(2.0)

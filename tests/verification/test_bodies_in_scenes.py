@@ -12,12 +12,10 @@ from scipy.spatial.transform import Rotation
 from patchlaw import InputError
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale import Scene, difference
+from patchlaw.multiscale import Run, Scene, difference, read_history
 from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.results.figures.contact import face_shear_figure
-from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.multiscale.runs.scene_run import Run
 
 CELLS, HEIGHT = (6, 6, 4), 1.0
 TICKS = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=CELLS).ticks

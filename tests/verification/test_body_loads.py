@@ -7,9 +7,8 @@ from helpers.laws_on_mesh import lay_on_mesh
 from scipy.optimize import brentq
 
 from patchlaw.geometry import BlockShape
-from patchlaw.multiscale import Scene
+from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
-from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.support.files import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks

@@ -7,8 +7,7 @@ from mpi4py import MPI
 from benchmarks.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
 from benchmarks.random_bodies import drawn, mesh_of
 from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.macro import write_mesh
-from patchlaw.macro.mesh.tagged import planar_face
+from patchlaw.macro import planar_face, write_mesh
 from patchlaw.multiscale import Scene, run
 
 SEED, APPROACH, CELLS = 193, 10e-3, 128

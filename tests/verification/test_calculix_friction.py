@@ -18,14 +18,11 @@ from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
 from scipy.interpolate import RegularGridInterpolator
 
+from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
 from patchlaw.geometry.materials import mindlin_ratio
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, ShearControl
-from patchlaw.geometry.spring_bed import Friction, SpringBed
+from patchlaw.geometry.spring_bed import SpringBed
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedFace
-from patchlaw.multiscale.laws.export import export_laws
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Run, Scene, export_laws
 
 pytestmark = [
     pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),

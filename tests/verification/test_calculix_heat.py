@@ -7,9 +7,7 @@ import pytest
 from helpers import calculix
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale.laws.export import export_laws
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale import LawTable, PatchLaw, export_laws
 from patchlaw.multiscale.laws.rows import LawRows
 
 pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")

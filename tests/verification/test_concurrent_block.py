@@ -8,10 +8,8 @@ import pytest
 from helpers.laws_on_mesh import lay_on_mesh
 from helpers.reference_cases import on_block
 
-from patchlaw.geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from patchlaw.multiscale import CellContact, Scene, run
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1), grid=(64, 64), lengths=(1.0, 1.0)

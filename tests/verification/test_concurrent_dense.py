@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
-from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import BodyModes, HalfSpaceModel
-from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale import CellContact
 
 MODULUS = 4000.0
 CELLS = 16

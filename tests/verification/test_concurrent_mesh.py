@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from helpers.box_msh import cube_section
 
-from patchlaw.multiscale import Scene
-from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.multiscale import Run, Scene
 
 E, NU = 4000.0, 0.15
 CONSTANTS = {"young_modulus": E, "poisson_ratio": NU}

@@ -12,7 +12,7 @@ from patchlaw.micro.transport import (
     radiation_conductance,
     total_conductance,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 MODULUS = 3000.0
 

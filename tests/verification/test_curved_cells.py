@@ -10,9 +10,8 @@ from helpers.user_problems import BOTTOM, TOP, box, clamped, elastic, marked
 from mpi4py import MPI
 
 from patchlaw.geometry import Control
-from patchlaw.macro import ContactProblem, Interface, compat, write_mesh
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.macro.mesh.tagged import planar_face, surface_area
+from patchlaw.macro import ContactProblem, Interface, compat, planar_face, read_mesh, write_mesh
+from patchlaw.macro.mesh.tagged import surface_area
 
 COMM = MPI.COMM_SELF
 RADIUS, HEIGHT = 5.0, 4.0

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 from helpers.meshed_slopes import forces_with_slopes_and_without
 
-from patchlaw.geometry import Material
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, Material
 from patchlaw.micro import FiniteSlopes
 from patchlaw.multiscale import Scene, make_setup
 

@@ -14,7 +14,7 @@ from scipy.interpolate import RectBivariateSpline
 from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface, reference_shapes
 from patchlaw.macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.micro import FreeSides
-from patchlaw.multiscale.results.accuracy import extrapolated
+from patchlaw.multiscale import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)

@@ -15,8 +15,15 @@ import numpy as np
 import pytest
 from helpers.mindlin_sphere import MindlinSphere
 
-from patchlaw.geometry import Control, Material, MaterialPair, Spectrum, Surface, synthesise
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import (
+    Control,
+    Material,
+    MaterialPair,
+    ShearControl,
+    Spectrum,
+    Surface,
+    synthesise,
+)
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.friction.coupled import press_coupled
 

@@ -13,9 +13,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from patchlaw.geometry import Control, Material, MaterialPair, Surface
-from patchlaw.geometry.contact_state import ShearState
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, ShearState, Surface
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.boundary_elements.half_space_grid import HalfSpaceGrid
 from patchlaw.micro.friction.coupled import press_coupled

@@ -5,11 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 
 FRICTION = 0.43
 SURFACES = {

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from helpers.mindlin_sphere import MindlinSphere
 
-from patchlaw.geometry import Surface
-from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.geometry import Material, MaterialPair, ShearControl, Surface
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 
 RADIUS, APPROACH, FRICTION = 2.0, 0.0913, 0.37
 SIDE = 1.06

@@ -7,13 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from patchlaw.geometry import Spectrum, spring_bed, synthesise
-from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, spring_bed, synthesise
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.geometry.spring_bed import coupling_of, springs_of
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale import representative_law
 
 MU, SIDE = 0.47, 1.0

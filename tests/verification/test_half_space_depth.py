@@ -7,7 +7,7 @@ import pytest
 from helpers.boussinesq import displacements, love_integral, stresses
 
 from patchlaw.geometry import Material, PatchGrid
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 LOADS = PatchGrid(grid=(2, 2), lengths=(1.0, 0.6), origin=(-0.2, 0.1))
 POINTS = np.random.default_rng(7).uniform((-1.0, -1.0, 0.05), (1.5, 1.5, 1.0), (30, 3)).T

@@ -10,15 +10,13 @@ from helpers.hard_cases import KINDS, centred, coarse_tables, from_file, history
 from helpers.laws_on_mesh import lay_on_mesh
 from scipy.optimize import brentq
 
-from patchlaw.geometry import Material
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, Material, PatchGrid
 from patchlaw.micro import influence_matrix
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale import PatchLaw, PatchLaws, Run
+from patchlaw.multiscale.laws.patch_law import repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.models.patch_contact import equilibrium
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 # isolated laws are tables as consistent ones are

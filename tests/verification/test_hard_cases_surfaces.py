@@ -5,10 +5,10 @@ import pytest
 from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
 from helpers.laws_on_mesh import lay_on_mesh
 
-from patchlaw.geometry.files.reading import read_surface
+from patchlaw.geometry import read_surface
 from patchlaw.geometry.filters import filled
 from patchlaw.multiscale import make_setup
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 X, Y = centred(32)
 DOME = -(X**2 + Y**2) / 0.8

@@ -7,9 +7,7 @@ import pytest
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.models.problem import Problem
+from patchlaw.multiscale import CellContact, LoadHistory, Problem
 from patchlaw.multiscale.observers.step_observers import missing_energy, work_of
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

@@ -15,11 +15,9 @@ import pytest
 from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control
 from patchlaw.macro import LawContactProblem, LoadedFace
-from patchlaw.multiscale.laws.export import export_laws
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Run, Scene, export_laws
 
 
 class Lines:

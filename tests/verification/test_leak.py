@@ -11,7 +11,7 @@ from helpers.gap_flow_forms import patir_cheng, slight_roughness, slit_resistanc
 from scipy.optimize import brentq
 
 from benchmarks.leak_error import flows
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import cell_network, gap_flow
 from patchlaw.support.network import network_flow

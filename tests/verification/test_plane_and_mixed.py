@@ -22,10 +22,10 @@ from helpers.plane_problems import (
 from scipy.optimize import brentq
 
 from patchlaw import Friction, PatchGrid, ShearControl
+from patchlaw.geometry import Control, RigidPlane
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import ContactProblem, Interface, LawsAtPoints, compat, write_contact_stiffness
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-11}
 LAW, LINE = PowerLaw(3e3), PowerLaw(400.0, power=1.0)

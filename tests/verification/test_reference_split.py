@@ -12,7 +12,7 @@ from helpers.reference_cases import COMM, MATERIAL, on_block
 
 from patchlaw.geometry import Control, Spectrum, reference_shapes, suggested_fine, synthesise
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
-from patchlaw.multiscale.results.accuracy import extrapolated
+from patchlaw.multiscale import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

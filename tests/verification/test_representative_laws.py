@@ -13,9 +13,7 @@ from scipy.optimize import brentq
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
 from patchlaw.macro import LawContactProblem
 from patchlaw.micro import HalfSpaceModel, influence_matrix
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.of_samples import representative_law
-from patchlaw.multiscale.models.patch_contact import PatchContact
+from patchlaw.multiscale import LawTable, PatchContact, representative_law
 
 AMPLITUDE = 0.01
 FULL = np.pi * AMPLITUDE  # mean pressure / E* that closes a wave of length 1 (Johnson 1985, 13.2)

@@ -7,8 +7,7 @@ from helpers.rough_sphere_oracle import EXPONENTIAL, gaussian, moment, rough_sph
 from scipy.integrate import quad
 
 from patchlaw.geometry import Control, PatchGrid
-from patchlaw.macro import LawContactProblem
-from patchlaw.macro.contact.loaded_face import LoadedFace
+from patchlaw.macro import LawContactProblem, LoadedFace
 
 RADIUS, DEVIATION = 1.0, 2e-4  # R and σ [mm]
 ALONG = np.sqrt(2.0 * RADIUS * DEVIATION)

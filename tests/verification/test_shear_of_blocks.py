@@ -11,8 +11,7 @@ import ufl
 from dolfinx import fem, mesh
 from helpers.block_cases import block_of
 
-from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry import BlockShape, Material, MaterialPair
 from patchlaw.macro import compat
 from patchlaw.micro import FrictionModel
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term

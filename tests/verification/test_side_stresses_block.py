@@ -15,8 +15,7 @@ from scipy.interpolate import RectBivariateSpline
 
 from patchlaw.geometry import RefinedShape
 from patchlaw.macro import Block, Material, block_mesh
-from patchlaw.micro import FreeSides
-from patchlaw.micro.boundary_elements.side_cells import SideStresses
+from patchlaw.micro import FreeSides, SideStresses
 
 PLACE, WIDTH, FINE, CELLS = 0.05, 0.06, 0.012, 256
 TICKS = (np.arange(CELLS) + 0.5) / CELLS

@@ -5,8 +5,7 @@ import pytest
 from helpers.box_msh import cube_section
 
 from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.multiscale import Scene
-from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.multiscale import Run, Scene
 
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 OTHER = {"young_modulus": 1700.0, "poisson_ratio": 0.15}

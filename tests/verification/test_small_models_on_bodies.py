@@ -11,11 +11,15 @@ import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.macro import Material
-from patchlaw.macro.compliance.face_compliance import face_compliance
-from patchlaw.micro import FreeSides, HalfSpaceModel, micro_model
-from patchlaw.micro.boundary_elements.body_modes import BodyModes
-from patchlaw.micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
+from patchlaw.macro import Material, face_compliance
+from patchlaw.micro import (
+    BodyModes,
+    FreeSides,
+    HalfSpaceModel,
+    half_space_modes,
+    micro_model,
+    side_modes,
+)
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = 4000.0 / (1.0 - 0.15**2)

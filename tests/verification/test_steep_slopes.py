@@ -6,8 +6,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from scipy.sparse.linalg import splu
 
-from patchlaw.geometry import RefinedShape, Surface, places_in_reach, roughness
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, RefinedShape, Surface, places_in_reach, roughness
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.multiscale import Scene, make_setup, run
 

@@ -12,10 +12,8 @@ from helpers.user_problems import HEXAHEDRA, TETRAHEDRA, box, elastic
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, ShearControl
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import (
     ContactProblem,
     FacePair,
@@ -32,7 +30,7 @@ from patchlaw.macro import (
 from patchlaw.macro.contact.face_equilibrium import checked_reaction
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.cli import main
-from patchlaw.support.errors import NotBalanced, NotConverged
+from patchlaw.support import NotBalanced, NotConverged
 
 TOP, BOTTOM, WEST, EAST, SOUTH, NORTH = range(1, 7)
 LENGTHS = (1.7, 1.1, 0.6)

@@ -26,9 +26,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
+from patchlaw.geometry import BlockShape, Control, RigidPlane
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import (
     Block,
     ContactProblem,

@@ -13,10 +13,7 @@ from scipy.io import mmread
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import BlockShape, Control, Friction, PatchGrid, RigidPlane
 from patchlaw.macro import (
     Block,
     ContactProblem,
@@ -34,7 +31,7 @@ from patchlaw.macro import (
 )
 from patchlaw.macro.contact import face_vibration
 from patchlaw.macro.contact.face_vibration import FaceVibration, mass_matrix
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 YOUNG, DENSITY = 4000.0, 1.3e-9
 SPEED = np.sqrt(YOUNG / DENSITY)

@@ -7,11 +7,10 @@ from dolfinx import mesh as dmesh
 from helpers.contact_laws import Spring
 from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clamped, elastic, marked
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import Control, Friction, RigidPlane, ShearControl
 from patchlaw.macro import ContactProblem, Interface, compat
 from patchlaw.macro.contact import newton
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 COEFFICIENT, BED = 3.7e-7, 41.3
 """Of wear [mm²/N], and of a Winkler bed [MPa/mm]."""

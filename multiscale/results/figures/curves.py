@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.figures import style

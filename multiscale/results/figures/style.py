@@ -21,7 +21,7 @@ from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
 from patchlaw.support import Array
 

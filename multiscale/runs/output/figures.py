@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from threading import Lock, local
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from patchlaw.geometry.statistics import roughness
+from patchlaw.geometry import roughness
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
 from patchlaw.multiscale.results.run_curves import over_pressure, slides
 from patchlaw.support import NotInstalled, cores, shared

@@ -10,7 +10,7 @@ from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.geometry.filters import spikes
-from patchlaw.support.checks import real_array
+from patchlaw.support import real_array
 
 
 @pytest.mark.long

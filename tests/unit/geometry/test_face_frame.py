@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 ANGLE = np.pi / 6.0
 

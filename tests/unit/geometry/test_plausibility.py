@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import Material, Spectrum, Surface, facing, read_surface, synthesise
+from patchlaw.geometry import (
+    Material,
+    Preparation,
+    Spectrum,
+    Surface,
+    facing,
+    read_surface,
+    synthesise,
+)
 from patchlaw.geometry.files.reading import surface_of
-from patchlaw.geometry.preparation import Preparation, prepared
+from patchlaw.geometry.preparation import prepared
 from patchlaw.geometry.statistics import check_finite_slopes, check_slopes, rms_gradient
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 

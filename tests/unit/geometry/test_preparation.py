@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import Spectrum, Surface, read_surface, synthesise
+from patchlaw.geometry import Crop, Filter, Preparation, Spectrum, Surface, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.geometry.filters import smoothed, spikes
-from patchlaw.geometry.preparation import Crop, Filter, Preparation, prepared
+from patchlaw.geometry.preparation import prepared
 
 X = (np.arange(64) + 0.5) / 64
 

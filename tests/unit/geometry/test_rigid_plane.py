@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import Control, PatchGrid, Surface
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
+from patchlaw.geometry.rigid_plane import PlaneLevers
 
 SQUARE = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
 

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from patchlaw.geometry.materials import Material, MaterialPair, mindlin_ratio
+from patchlaw.geometry import Friction, Material, MaterialPair
+from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.geometry.spring_bed import (
     FEWEST,
     MOST,
     TOLERANCE,
-    Friction,
     SpringBed,
     never_falling,
     springs_of,
     springs_of_law,
     stiffness_ratios,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 TOUCH, END, DECAY = 0.37e-3, 6.1e-3, 0.83e-3
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 STEEL = Material(young_modulus=2e5, poisson_ratio=0.3)
 

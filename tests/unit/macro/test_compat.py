@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.macro import Material, compat
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

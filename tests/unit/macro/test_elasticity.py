@@ -6,10 +6,9 @@ from dolfinx import mesh as dmesh
 from helpers.body_meshes import HIGH, LOW, box
 from mpi4py import MPI
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.macro import Block, Material, MeshedBody, Support, block_mesh, compat
+from patchlaw.geometry import BlockShape
+from patchlaw.macro import Block, Material, MeshedBody, Support, TaggedMesh, block_mesh, compat
 from patchlaw.macro.elastic_body import rigid_body_modes
-from patchlaw.macro.mesh.tagged import TaggedMesh
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

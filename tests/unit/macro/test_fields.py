@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface
-from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
 from patchlaw.macro import (
     Block,
     FieldStep,

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from patchlaw.macro import disk_caches as jit
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def age(path, seconds):

@@ -10,8 +10,7 @@ from helpers.resumed_runs import ran_past
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import STEFAN_BOLTZMANN
-from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale import Run, Scene, make_setup, read_history, run
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 

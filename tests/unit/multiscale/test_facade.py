@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 
 import patchlaw
-from patchlaw import geometry, macro, micro, multiscale
-from patchlaw.support import errors
+from patchlaw import geometry, macro, micro, multiscale, support
 
 PACKAGES = {
-    "errors": errors,
+    "support": support,
     "geometry": geometry,
     "micro": micro,
     "multiscale": multiscale,
@@ -42,10 +41,7 @@ def test_importing_it_loads_nothing(root):
     assert found.stdout.strip() == "[]"
 
 
-LAZY = {name: package for name, package in PACKAGES.items() if name != "errors"}
-
-
-@pytest.mark.parametrize("package", LAZY.values(), ids=LAZY)
+@pytest.mark.parametrize("package", PACKAGES.values(), ids=PACKAGES)
 def test_the_stub_names_the_modules_of_all_names(package):
     assert dir(package)
     for name in dir(package):
@@ -53,7 +49,7 @@ def test_the_stub_names_the_modules_of_all_names(package):
         assert name in package.__all__, name
 
 
-@pytest.mark.parametrize("package", LAZY.values(), ids=LAZY)
+@pytest.mark.parametrize("package", PACKAGES.values(), ids=PACKAGES)
 def test_no_module_has_a_public_name(package):
     """Its import would replace what the name stands for in its package."""
     folder = Path(str(package.__file__)).parent

@@ -12,14 +12,13 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
-from patchlaw.multiscale import Run, Scene, read_fields
+from patchlaw.multiscale import Run, Scene, read_fields, read_history
 from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.laws.transmissivity import _scatter, error_of_grid, sample_transmissivity
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.observed import leak_figure
-from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}
 SUPPORTS = [

@@ -9,17 +9,14 @@ from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
-from patchlaw.multiscale import Run, make_setup, run
+from patchlaw.geometry import ShearControl
+from patchlaw.micro import FrictionModel, HalfSpaceModel
+from patchlaw.multiscale import LoadHistory, Run, make_setup, read_history, run
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.models import cell_coupling
 from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
-from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 PATH = {
     "force": "0.9 N",

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
-from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.laws.law_table import read_laws, write_laws
+from patchlaw.multiscale import Run, Scene, make_setup, read_laws, run, write_laws
 from patchlaw.multiscale.models import problem
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 MU, SHIFT = 0.3, 4e-4
 LOAD = {

@@ -78,7 +78,7 @@ def test_areas_of_patches_bear_their_forces(kind):
 
 
 def test_representative_laws_end_below_the_hardness():
-    from patchlaw.multiscale.laws.of_samples import representative_law
+    from patchlaw.multiscale import representative_law
 
     surface = make_setup(scene(periodic=True)).parts.surface
     given = {"contact_modulus": 4000.0, "periodic": True, "hardness": HARDNESS}

@@ -10,14 +10,12 @@ from scipy.ndimage import maximum_filter
 
 from patchlaw.micro import transport
 from patchlaw.micro.transport import gap_flow
-from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale import History, Run, Scene, make_setup, read_history, run
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
 from patchlaw.multiscale.results.figures.observed import leak_figure
-from patchlaw.multiscale.results.files import read_history
-from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
 NAMES = [

@@ -4,7 +4,7 @@ import pytest
 
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.machine import detached_processes, refuse_detached_processes
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = "demos/scenes/paper.toml"
 

@@ -21,7 +21,7 @@ from patchlaw.multiscale.machine import (
 )
 from patchlaw.multiscale.scene import memory as cost
 from patchlaw.multiscale.scene.memory import body_request, scene_requests, shortage_warnings
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells

@@ -8,9 +8,8 @@ from types import ModuleType
 import pytest
 from helpers.scene_inputs import BASE
 
+from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.runs.output.results import LIBRARIES, provenance
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
-from patchlaw.multiscale import console
-from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale import LoadHistory, consistent_laws, console, isolated_laws
 from patchlaw.multiscale.readable import WHOLE
-from patchlaw.support.parallel import shared
+from patchlaw.support import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5)

@@ -4,10 +4,8 @@ from functools import cache
 
 import pytest
 
-from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.models.problem import Problem
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.support.errors import NotConverged
+from patchlaw.multiscale import Problem, Run, Scene, run
+from patchlaw.support import NotConverged
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2, "seed": 3}
 BLOCK = {"height": 1.0, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [6, 6, 4]}

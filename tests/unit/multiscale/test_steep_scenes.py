@@ -10,7 +10,7 @@ from patchlaw.geometry import Control
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 BLOCK = {"young_modulus": 4000.0, "poisson_ratio": 0.27}
 

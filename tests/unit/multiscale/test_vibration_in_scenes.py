@@ -8,11 +8,9 @@ from helpers.resumed_runs import gone_on, ran_past
 from scipy.optimize import brentq
 
 from patchlaw.macro.contact.face_vibration import FaceVibration
-from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale import Run, Scene, make_setup, read_history
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 E, NU, DENSITY, SIDE, HEIGHT = 4000.0, 0.3, 2e-9, 6.0, 4.0
 

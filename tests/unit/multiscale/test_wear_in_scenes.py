@@ -7,19 +7,17 @@ import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw import Material, Problem, Step, read_surface, run
-from patchlaw.geometry import Control
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import Control, ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
-from patchlaw.multiscale import CellContact, Run, Scene, read_fields
+from patchlaw.multiscale import CellContact, Run, Scene, read_contact, read_fields
 from patchlaw.multiscale.models.measured_errors.errors import (
     MeasuredErrors,
     WearErrors,
     error_columns,
 )
-from patchlaw.multiscale.results.files import read_contact
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 COEFFICIENT, SLID = 3.1e-10, (37.0, 1.9e3, 2.3e4)
 """Of wear [mm²/N], and what is slid [mm]."""

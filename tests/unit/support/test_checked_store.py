@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support import InputError, NotWritten
 from patchlaw.support.files import append, fingerprint, read_record, sealed, unsealed, write_record
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.support.checks import cell_counts, check_scale, frozen_array, positive_lengths
+from patchlaw.support import cell_counts, check_scale, frozen_array, positive_lengths
 
 
 @pytest.mark.parametrize("value", [(1, 2.5), [1, 2.5], np.array([1, 2.5])])

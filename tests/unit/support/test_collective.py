@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.support.parallel import cores, distributed, shared
+from patchlaw.support import cores, shared
+from patchlaw.support.parallel import distributed
 
 
 def test_equal_tasks_are_distributed_in_turn():

@@ -6,8 +6,9 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info
 
+from patchlaw.support import cores, hold_blas, in_threads, node_cores
 from patchlaw.support import parallel as module
-from patchlaw.support.parallel import allocated, cores, hold_blas, in_threads, node_cores, own_cores
+from patchlaw.support.parallel import allocated, own_cores
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (

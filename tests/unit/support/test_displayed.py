@@ -3,18 +3,20 @@
 import numpy as np
 import pytest
 
-from patchlaw.geometry import PatchGrid, Spectrum, Surface, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.of_samples import representative_law
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale import (
+    BodyFields,
+    Comparison,
+    ContactHistory,
+    LawTable,
+    PatchLaw,
+    Scene,
+    representative_law,
+    sweep,
+)
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.results.contacts import ContactHistory, ContactRecord
-from patchlaw.multiscale.results.files import BodyFields
-from patchlaw.multiscale.runs.comparison import Comparison
-from patchlaw.multiscale.runs.sweep import sweep
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.support.displayed import Displayed, of_columns, spread, table_html, table_text
 
 

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from patchlaw.support.errors import InputError, NotBalanced, NotConverged
+from patchlaw.support import InputError, NotBalanced, NotConverged
 
 
 @pytest.mark.parametrize(

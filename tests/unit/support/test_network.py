@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 from patchlaw.support.network import MOST_IMBALANCE, Network, banded, factorised, network_flow
 
 IN, OUT = -2, -1

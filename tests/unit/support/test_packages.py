@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from patchlaw.support.errors import NotInstalled
+from patchlaw.support import NotInstalled
 from patchlaw.support.packages import optional_packages
 
 COMMAND = "import sys; from patchlaw.__main__ import main; sys.exit(main())"

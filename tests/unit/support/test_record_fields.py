@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from typing_extensions import TypeAliasType
 
-from patchlaw.support import arguments
-from patchlaw.support.arguments import (
+from patchlaw.support import (
     KEY,
     Count,
+    InputError,
     Length,
     Limits,
     PositiveLength,
+    arguments,
     check_fields,
     checked,
     key_of,
     part_of,
 )
-from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)

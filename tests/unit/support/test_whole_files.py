@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale import History, LoadStep
 from patchlaw.multiscale.console import show_history
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.files import history_files, write_files
-from patchlaw.multiscale.results.history import PATCH_COLUMNS, History
-from patchlaw.support.errors import NotWritten
+from patchlaw.multiscale.results.history import PATCH_COLUMNS
+from patchlaw.support import NotWritten
 from patchlaw.support.files import csv_text, write_text
 
 

@@ -7,7 +7,7 @@ import pytest
 from helpers.mesh_files import gmsh_boxes, gmsh_session, write_boxes, write_msh2
 
 from patchlaw.geometry.meshes.gmsh_file import read_gmsh_file
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
 SQUARES = [0, 1, 3, 2, 4, 5, 7, 6]  # around the lower, then the upper square, as gmsh counts

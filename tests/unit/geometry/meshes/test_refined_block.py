@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import Surface
-from patchlaw.geometry.meshes.refined_block import (
-    EdgeLengths,
-    RefinedShape,
-    depth_below_plane,
-    places_in_reach,
-)
+from patchlaw.geometry import RefinedShape, Surface, places_in_reach
+from patchlaw.geometry.meshes.refined_block import EdgeLengths, depth_below_plane
 
 
 def shape(**changes):

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.geometry.materials import Material
+from patchlaw.geometry import Material
+from patchlaw.macro import face_compliance
 from patchlaw.macro.compliance import elements
 from patchlaw.macro.compliance.elements import levels
-from patchlaw.macro.compliance.face_compliance import face_compliance
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 SOFT = Material(young_modulus=1.0, poisson_ratio=0.3)
 

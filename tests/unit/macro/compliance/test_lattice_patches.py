@@ -5,8 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from patchlaw import InputError, NotConverged
-from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.geometry.materials import Material
+from patchlaw.geometry import BlockShape, Material, PatchGrid
 from patchlaw.macro import Block, LoadedFace, block_mesh, displacements_under
 from patchlaw.macro.compliance import elements
 from patchlaw.macro.compliance.face_compliance import lattice_compliance

@@ -5,11 +5,9 @@ import pytest
 from helpers.body_meshes import HIGH, SIDE, box, hanging, standing
 from helpers.contact_laws import PowerLaw
 
-from patchlaw.geometry import Material, PatchGrid
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import FacePair, LawContactProblem
+from patchlaw.geometry import Control, Material, PatchGrid
+from patchlaw.macro import FacePair, LawContactProblem, Loads, Traction
 from patchlaw.macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
-from patchlaw.macro.mesh.supports import Loads, Traction
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.3, 0.9))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.macro.contact.face_leak import TriangleFace
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.network import MOST_IMBALANCE
 
 INNER, OUTER = 22.0, 24.5

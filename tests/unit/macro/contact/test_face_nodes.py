@@ -5,9 +5,8 @@ import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro import Block, Material, RoughFace, block_mesh
 from patchlaw.macro.contact.face_nodes import TopNodes
-from patchlaw.macro.contact.rough_face import RoughFace
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

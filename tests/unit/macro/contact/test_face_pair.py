@@ -8,9 +8,9 @@ from dolfinx import mesh as dmesh
 from helpers.body_meshes import HIGH, LOW, box, hanging, standing
 from helpers.contact_laws import PowerLaw, Spring
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import (
+    FacePair,
     LawContactProblem,
     Loads,
     Material,
@@ -21,9 +21,8 @@ from patchlaw.macro import (
     compat,
     largest_rise,
 )
-from patchlaw.macro.contact.face_pair import FacePair
 from patchlaw.macro.mesh.facet_parts import straight_parts, triangle_areas
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 SOFT = Material(young_modulus=2000.0, poisson_ratio=0.3)
 HARD = Material(young_modulus=4000.0, poisson_ratio=0.3)

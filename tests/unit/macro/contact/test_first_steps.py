@@ -9,9 +9,7 @@ from helpers.user_problems import clamped, elastic
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import Control, Friction, PatchGrid
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import FirstSteps

@@ -5,8 +5,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry import Control, PatchGrid, Spectrum, synthesise
-from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, synthesise
 from patchlaw.macro import (
     Block,
     LoadedFace,

@@ -13,10 +13,8 @@ from helpers.contact_laws import PowerLaw, RangedLaw
 from helpers.user_problems import HEXAHEDRA, LAWS, PATCHES, TOP, box, clamped, elastic, marked
 from petsc4py import PETSc
 
-from patchlaw.geometry import PatchGrid
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.geometry.materials import mindlin_ratio
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import (
     ContactProblem,
     ElasticBody,
@@ -28,7 +26,7 @@ from patchlaw.macro import (
     compat,
 )
 from patchlaw.macro.contact import face_sliders
-from patchlaw.support.errors import InputError, NotBalanced, NotConverged
+from patchlaw.support import InputError, NotBalanced, NotConverged
 
 MU, NU = 0.41, 0.2
 FRICTION = Friction(coefficient=MU, poisson_ratio=NU)

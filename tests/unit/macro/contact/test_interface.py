@@ -15,13 +15,11 @@ from helpers.user_problems import BOTTOM, LAWS, PATCHES, TOP, box, clamped, elas
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
 from patchlaw.macro.contact import law_operator
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 try:  # before any form is made, for UFL numbers its types when they are imported
     import dolfinx_external_operator as package

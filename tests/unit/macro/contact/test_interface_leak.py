@@ -10,15 +10,13 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 
-from patchlaw.geometry import Regions
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry import Control, PatchGrid, Regions, RigidPlane
 from patchlaw.macro import Interface, compat
 from patchlaw.macro.contact.face_leak import LeakingFace, TriangleFace
-from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale import LawTable, PatchLaw
+from patchlaw.multiscale.laws.law_table import WornLaws
 from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 LENGTHS = (1.5, 1.0, 1.0)
 WATER = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}

@@ -11,9 +11,7 @@ from helpers.contact_laws import PowerLaw
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import BlockShape, Control, PatchGrid
 from patchlaw.macro import (
     Block,
     FieldStep,
@@ -27,7 +25,7 @@ from patchlaw.macro import (
     write_fields,
 )
 from patchlaw.macro.contact.initial_guess import DisplacementBasis
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 Spring = partial(PowerLaw, k=1e3, power=1.0)
 

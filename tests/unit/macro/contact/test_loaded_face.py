@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
 from patchlaw.macro.contact.face_laws import by_patch
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
 

@@ -20,9 +20,9 @@ from helpers.user_problems import (
 )
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry import Control, RigidPlane
 from patchlaw.macro import ContactProblem, Interface, compat, contact_facets
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
 

@@ -24,12 +24,9 @@ from helpers.user_problems import (
 )
 from mpi4py import MPI
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.geometry.spring_bed import Friction
-from patchlaw.macro import ContactProblem, Interface, compat
-from patchlaw.macro.contact.law_operator import LawsAtPoints
-from patchlaw.support.errors import InputError
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
+from patchlaw.macro import ContactProblem, Interface, LawsAtPoints, compat
+from patchlaw.support import InputError
 
 
 def pressed(law, moved, comm=MPI.COMM_SELF, disc=(6, 4, 2), poisson=0.0, **options):

@@ -9,9 +9,8 @@ from helpers.body_meshes import HIGH, LOW, box
 from patchlaw import InputError
 from patchlaw.geometry import Control, Material, RefinedShape, Spectrum, synthesise
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.macro import MeshedBody, Support, TaggedMesh, UnilateralContactProblem
+from patchlaw.macro import MeshedBody, Support, TaggedMesh, UnilateralContactProblem, planar_face
 from patchlaw.macro.contact.rough_face import FlatBody
-from patchlaw.macro.mesh.tagged import planar_face
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SURFACE = synthesise(

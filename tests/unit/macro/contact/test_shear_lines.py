@@ -5,7 +5,7 @@ import pytest
 from helpers.contact_laws import RangedLaw
 from scipy.optimize import brentq, root
 
-from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry import Control, ShearControl
 from patchlaw.geometry.sliders import SliderResponse, Sliders
 from patchlaw.geometry.spring_bed import springs_of_law
 from patchlaw.macro.contact.face_sliders import find_shift, shear_lines

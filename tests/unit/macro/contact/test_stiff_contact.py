@@ -7,11 +7,8 @@ import pytest
 from helpers.body_meshes import box, hanging, standing
 from helpers.contact_laws import Exponential, PowerLaw
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, ShearControl
-from patchlaw.geometry.spring_bed import Friction
-from patchlaw.macro import FacePair, LawContactProblem, Material
-from patchlaw.macro.contact.loaded_face import displacements_under
+from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
+from patchlaw.macro import FacePair, LawContactProblem, Material, displacements_under
 from patchlaw.macro.linear_solvers.options import has_hypre
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

@@ -8,11 +8,8 @@ import pytest
 from mpi4py import MPI
 
 from patchlaw import InputError, NotConverged
-from patchlaw.geometry import Control, PatchGrid, Spectrum, synthesise
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.macro import Block, Material, block_mesh
-from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
-from patchlaw.macro.mesh.block import rough_block_mesh
+from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, synthesise
+from patchlaw.macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

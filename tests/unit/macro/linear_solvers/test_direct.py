@@ -9,7 +9,7 @@ from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers.options import DIRECT_DEFAULTS, default_options
 from patchlaw.macro.linear_solvers.solvers import set_up, solve_linear
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 5, 4), element="Q2")
 INCOMPRESSIBLE = Material(young_modulus=4000.0, poisson_ratio=0.4999)

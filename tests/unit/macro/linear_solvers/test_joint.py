@@ -5,8 +5,7 @@ import pytest
 from helpers.body_meshes import box, hanging, standing
 from helpers.contact_laws import Spring
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import FacePair, LawContactProblem, Material
 from patchlaw.macro.linear_solvers import selection
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at

@@ -8,7 +8,7 @@ from helpers.body_meshes import box, hanging, standing
 from petsc4py import PETSc
 from scipy.linalg import eigh
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.macro import FacePair, Material
 from patchlaw.macro.linear_solvers import solvers
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at

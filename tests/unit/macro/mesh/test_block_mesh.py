@@ -6,10 +6,9 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.meshes.refined_block import RefinedShape
+from patchlaw.geometry import BlockShape, RefinedShape
 from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import block_mesh, compat
 from patchlaw.macro.mesh.contact_face import Opposite, facet_quadrature, top_facets
 from patchlaw.macro.mesh.facet_parts import _near, cut_triangles, triangle_areas

@@ -8,11 +8,16 @@ from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box, write_boxes, write_msh2
 from mpi4py import MPI
 
-from patchlaw.macro import Material, MeshedBody, compat
-from patchlaw.macro.mesh.from_file import read_mesh
-from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
-from patchlaw.macro.mesh.xdmf import write_mesh
-from patchlaw.support.errors import InputError
+from patchlaw.macro import (
+    Material,
+    MeshedBody,
+    TaggedMesh,
+    compat,
+    planar_face,
+    read_mesh,
+    write_mesh,
+)
+from patchlaw.support import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
@@ -65,7 +70,7 @@ def test_cells_of_either_hand_are_taken(tmp_path):
 
 
 def test_compiled_forms_serve_meshes_of_files_and_lattices(tmp_path):
-    from patchlaw.geometry.meshes.block import BlockShape
+    from patchlaw.geometry import BlockShape
     from patchlaw.macro import block_mesh
 
     read = read_mesh(write_boxes(tmp_path / "part.msh"), COMM).mesh

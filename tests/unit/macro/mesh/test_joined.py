@@ -30,7 +30,7 @@ from mpi4py import MPI
 
 from patchlaw.macro import ContactProblem, Interface, TaggedMesh, compat, joined_meshes
 from patchlaw.macro.mesh.tagged import surface_area
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def force(mesh, tags, faces, law, poisson=0.3):

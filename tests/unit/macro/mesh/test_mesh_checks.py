@@ -8,11 +8,10 @@ from dolfinx import mesh as dmesh
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
 
-from patchlaw.macro import compat
+from patchlaw.macro import TaggedMesh, compat
 from patchlaw.macro.mesh.facets import parts
 from patchlaw.macro.mesh.from_file import _volumes, check_cells, check_connected, size_note
-from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -6,8 +6,8 @@ from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
 
-from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
-from patchlaw.support.errors import InputError
+from patchlaw.macro import TaggedMesh, planar_face
+from patchlaw.support import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)

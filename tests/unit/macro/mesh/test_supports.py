@@ -8,9 +8,9 @@ from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
 from scipy.sparse import csr_array
 
-from patchlaw.macro import compat
-from patchlaw.macro.mesh.supports import Traction, check_loads, check_supports, free_motions
-from patchlaw.support.errors import InputError
+from patchlaw.macro import Traction, check_loads, check_supports, compat
+from patchlaw.macro.mesh.supports import free_motions
+from patchlaw.support import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)
@@ -66,7 +66,7 @@ def test_rotation_about_a_slanted_line():
 
 def test_stiffness_agrees():
     """The motions left are as many as the singular directions of the stiffness."""
-    from patchlaw.geometry.materials import Material
+    from patchlaw.geometry import Material
     from patchlaw.macro.elastic_body import stiffness_form
 
     box = tagged_box(COMM, cells=(2, 2, 1))

@@ -4,8 +4,8 @@ import pytest
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
 
-from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.errors import InputError
+from patchlaw.macro import TaggedMesh
+from patchlaw.support import InputError
 
 
 @pytest.fixture(scope="module")

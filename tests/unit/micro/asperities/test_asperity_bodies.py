@@ -17,8 +17,8 @@ from patchlaw.geometry import (
     patch_means,
     synthesise,
 )
-from patchlaw.micro import MODELS, AsperityModel, HertzContact
-from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from patchlaw.micro import MODELS, AsperityModel, BodyModes, HertzContact
+from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 
 MODULUS = 4000.0
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

@@ -6,9 +6,10 @@ from helpers.asperity_states import places
 from scipy.special import elliprf
 
 from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.micro import BodyModes, HertzContact
 from patchlaw.micro.asperities.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
-from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from patchlaw.micro.closed_forms.hertz import HertzContact, shape_factors
+from patchlaw.micro.boundary_elements.body_modes import BodyPoints
+from patchlaw.micro.closed_forms.hertz import shape_factors
 
 
 def interaction(asperities, circular):

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from patchlaw import NotConverged
-from patchlaw.geometry import Control
-from patchlaw.geometry.rigid_plane import PlaneLevers, PlaneResponse, RigidPlane
+from patchlaw.geometry import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import PlaneLevers, PlaneResponse
 from patchlaw.micro.asperities.model import Peaks
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])

@@ -6,8 +6,9 @@ from helpers.uneven_grid import uneven_grid
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_values
-from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from patchlaw.support.errors import InputError
+from patchlaw.micro import BodyModes
+from patchlaw.micro.boundary_elements.body_modes import BodyPoints
+from patchlaw.support import InputError
 
 LENGTHS = (1.2, 0.8)
 

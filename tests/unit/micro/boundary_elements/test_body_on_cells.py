@@ -8,8 +8,7 @@ import pytest
 from helpers.free_motions import contact_problem
 
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.boundary_elements.body_modes import BodyModes
+from patchlaw.micro import BodyModes, HalfSpaceModel
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity import solver

@@ -7,9 +7,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Control, Material, Spectrum, Surface, synthesise
-from patchlaw.micro import FreeSides, HalfSpaceModel
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, coarse_grid
-from patchlaw.micro.boundary_elements.side_cells import SideStresses
+from patchlaw.micro import FiniteSlopes, FreeSides, HalfSpaceModel, SideStresses, coarse_grid
 
 
 def displaced(heights, pressure, shear, nu):

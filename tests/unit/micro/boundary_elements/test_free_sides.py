@@ -12,7 +12,7 @@ from patchlaw.micro import FreeSides, HalfSpaceModel, side_modes, side_stress_mo
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.side_cells import SideTerm, side_cells
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID = (20, 30)

@@ -5,7 +5,7 @@ import pytest
 from helpers.boussinesq import love_integral
 from scipy import fft
 
-from patchlaw.micro.boundary_elements.free_sides import FreeSides
+from patchlaw.micro import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import (
     Cells,

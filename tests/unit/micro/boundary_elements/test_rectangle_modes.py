@@ -7,8 +7,7 @@ from helpers.uneven_grid import uneven_grid
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means
-from patchlaw.micro import FreeSides, influence_matrix
-from patchlaw.micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
+from patchlaw.micro import FreeSides, half_space_modes, influence_matrix, side_modes
 from patchlaw.micro.boundary_elements.side_cells import side_cells
 from patchlaw.micro.closed_forms.love import love_mean
 

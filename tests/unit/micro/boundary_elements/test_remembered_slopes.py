@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
-from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.micro import FiniteSlopes, FreeSides, HalfSpaceModel, SideStresses
 from patchlaw.micro.boundary_elements import compliance_matrix
 from patchlaw.micro.boundary_elements.compliance_matrix import RememberedSlopes
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
-from patchlaw.micro.boundary_elements.side_cells import SideStresses
 from patchlaw.micro.complementarity import slope_iteration
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)

@@ -5,8 +5,7 @@ import pytest
 from helpers.love_stresses import love_stresses
 
 from patchlaw.geometry import Material
-from patchlaw.micro import FreeSides
-from patchlaw.micro.boundary_elements.side_cells import SideStresses
+from patchlaw.micro import FreeSides, SideStresses
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID, SPACING = (20, 30), (0.05, 0.05)

@@ -12,7 +12,7 @@ from patchlaw.micro import (
     half_space_stress_modes,
     side_stress_modes,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 LENGTHS, COUNT, NU = (1.0, 1.5), 4, 0.2
 SIDES = FreeSides(lengths=LENGTHS, poisson_ratio=NU, decay_length=0.25)

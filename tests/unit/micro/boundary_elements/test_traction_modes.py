@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from patchlaw.geometry import Material, MaterialPair
 from patchlaw.geometry.legendre_modes import mode_means
-from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.micro.boundary_elements.body_modes import TractionModes, half_space_traction_modes
+from patchlaw.micro import TractionModes, half_space_traction_modes
 from patchlaw.micro.friction.tangential_grid import CrossCompliance, TangentialGrid
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 LENGTHS, GRID, COUNT = (1.0, 0.7), (96, 64), 3
 SPACING = LENGTHS[0] / GRID[0], LENGTHS[1] / GRID[1]

@@ -7,8 +7,7 @@ import pytest
 
 from patchlaw import NotConverged
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity import slope_iteration
 

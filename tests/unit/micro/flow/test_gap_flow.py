@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.micro.transport import gap_flow, widened_gap
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 LENGTHS = (1.3, 0.7)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
-from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry import Material, MaterialPair
 from patchlaw.micro import FrictionModel
 from patchlaw.micro.friction.tangential_grid import CrossCompliance
 

@@ -8,7 +8,7 @@ import pytest
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.friction.stick_slip import TractionProblem, solve_tractions
 from patchlaw.micro.friction.tangential_grid import TangentialGrid
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 GRID, SPACING = (7, 6), (0.13, 0.21)
 

@@ -6,7 +6,7 @@ import pytest
 
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
 from patchlaw.multiscale import Scene, make_setup
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def setup(

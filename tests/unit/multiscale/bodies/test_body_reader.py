@@ -20,11 +20,10 @@ from patchlaw.macro import (
     write_mesh,
 )
 from patchlaw.macro.compliance.surroundings import surroundings
-from patchlaw.multiscale import run
+from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.bodies.mesh import mesh_key
 from patchlaw.multiscale.bodies.reader import read_bodies
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.files import fingerprint
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}

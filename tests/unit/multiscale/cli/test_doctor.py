@@ -10,7 +10,7 @@ import pytest
 from patchlaw.macro import disk_caches as jit
 from patchlaw.multiscale.cli import about
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 @pytest.mark.long

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import read_laws
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.laws import FORMATS
-from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.support.files import LIST
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}

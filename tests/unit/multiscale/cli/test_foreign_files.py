@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs import comparison
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.files import LIST, append, unsealed
 
 MINE = b"what nobody else has\n"

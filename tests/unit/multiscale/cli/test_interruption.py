@@ -14,7 +14,7 @@ from patchlaw.multiscale import Run
 from patchlaw.multiscale.cli import about
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.cli.interruption import Ended, Stopped, signals_raise, watching
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")

@@ -6,6 +6,7 @@ import pytest
 
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.cli.init import (
     CONTACT_AREA,
     START,
@@ -15,7 +16,6 @@ from patchlaw.multiscale.cli.init import (
     scene_text,
     sensible_force,
 )
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.support.quantities import parse_quantity
 

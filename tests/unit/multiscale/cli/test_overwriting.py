@@ -5,10 +5,9 @@ import json
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, CheckpointWriter
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.files import OwnFiles
 
 STIFFER = "block.young_modulus=5 GPa"

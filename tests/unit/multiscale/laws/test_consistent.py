@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from helpers.along import respond
 
-from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.laws.of_patches import WholeSurface, consistent_laws
-from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
+from patchlaw.multiscale import PatchContact, consistent_laws
+from patchlaw.multiscale.laws.of_patches import WholeSurface
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact
 
 MODULUS = 4000.0
 END = 9e-3

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.files import check_hdf5, checksum_hdf5, hdf5_bytes
 
 

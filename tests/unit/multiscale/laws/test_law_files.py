@@ -6,11 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_table import LawTable, read_laws, write_laws
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale import LawTable, PatchLaw, read_laws, write_laws
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.files import checksum_hdf5, hdf5_bytes
 
 SCALARS = (

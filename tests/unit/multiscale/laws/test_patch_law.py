@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):

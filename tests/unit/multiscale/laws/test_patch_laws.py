@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
+from patchlaw.multiscale import LawTable, PatchLaw, PatchLaws
+from patchlaw.multiscale.laws.law_table import WornLaws
 from patchlaw.multiscale.laws.rows import LawRows, Untouched
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):

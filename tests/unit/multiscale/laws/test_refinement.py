@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale import PatchLaw, Run, Scene
 from patchlaw.multiscale.laws.interpolation import LawCurves
-from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import RowMaker, errors_at, refined
 from patchlaw.multiscale.laws.rows import LawRows
 

@@ -11,9 +11,9 @@ from helpers.along import respond
 from patchlaw import InputError
 from patchlaw.geometry import Control, Material, Regions, Spectrum, Surface, synthesise
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.multiscale import LawTable, read_laws, representative_law, representative_laws
 from patchlaw.multiscale.laws.export import export_texts
-from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
-from patchlaw.multiscale.laws.of_samples import representative_law, representative_laws
+from patchlaw.multiscale.laws.law_table import law_bytes
 
 MODULUS = 4000.0
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_table import LawTable, read_laws, write_laws
-from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale import LawTable, PatchLaw, read_laws, write_laws
+from patchlaw.multiscale.laws.patch_law import repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 
 APPROACH = np.linspace(0.0, 8e-3, 9)

@@ -5,10 +5,9 @@ import re
 import pytest
 
 from patchlaw.geometry import Control
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.path import Path, Stage, Step
-from patchlaw.multiscale.models.problem import Problem
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale import LoadHistory, Problem, Step
+from patchlaw.multiscale.loading.path import Path, Stage
+from patchlaw.support import InputError
 
 
 @pytest.mark.parametrize(

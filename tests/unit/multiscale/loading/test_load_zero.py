@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control
 from patchlaw.multiscale import Run, Scene, read_laws, run
 from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.runs.output.results import write_results

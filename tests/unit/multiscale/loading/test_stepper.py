@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.loading.path import Stage, Step
-from patchlaw.multiscale.models.problem import BeyondLaws, Problem
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.multiscale import LoadHistory, LoadStep, Problem, Step
+from patchlaw.multiscale.loading.load_step import PatchState
+from patchlaw.multiscale.loading.path import Stage
+from patchlaw.multiscale.models.problem import BeyondLaws
+from patchlaw.support import InputError, NotConverged
 
 
 class Spring:

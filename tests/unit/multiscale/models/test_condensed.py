@@ -8,10 +8,9 @@ import pytest
 from helpers.laws_on_mesh import lay_on_mesh
 from petsc4py import PETSc
 
-from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.models.loaded_patches import whole_stiffness
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.multiscale.models.loaded_patches import LoadedPatches
 from patchlaw.multiscale.models.patch_contact import equilibrium
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 
 
 class HertzLaws:

@@ -5,12 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.multiscale import FaceContact, LawTable, PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.problem import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))

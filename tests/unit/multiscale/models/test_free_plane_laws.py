@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError, NotConverged
-from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.of_patches import consistent_laws
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale import LawTable, PatchLaw, consistent_laws
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact
 

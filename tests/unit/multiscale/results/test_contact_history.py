@@ -11,7 +11,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.multiscale import Run, Scene, read_contact, read_fields
 from patchlaw.multiscale.results.contacts import FIELDS
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 CYCLE = ("load.force=['1.5 N', '0 N']", "micro.hardness=80 MPa", "output.contact=all")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.results.accuracy import extrapolated
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale import extrapolated
+from patchlaw.support import InputError
 
 LIMIT = 4.0
 RATIOS = (2.0 ** (1 / 3), 1.5, 2.0)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from patchlaw import Scene, run
-from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
-from patchlaw.multiscale.results.history import History
-from patchlaw.support.errors import InputError
+from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.multiscale import History, LoadStep
+from patchlaw.multiscale.loading.load_step import COLUMNS, PatchState
+from patchlaw.support import InputError
 
 FIRST_COLUMNS = (
     "step", "approach_mm", "force_N", "mean_pressure_MPa", "contact_area_fraction",

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale import History, Scene, run
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale import History, LoadStep, Scene, run
+from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.figures.curves import over_pressure_figure
 from patchlaw.multiscale.results.run_curves import over_pressure, pressure_between
 

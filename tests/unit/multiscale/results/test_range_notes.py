@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from helpers.along import respond
 
-from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import BodyModes, micro_model
-from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
-from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale import CellContact, consistent_laws, isolated_laws
 from patchlaw.multiscale.results.history import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))

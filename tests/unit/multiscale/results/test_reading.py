@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.multiscale import read_contact, read_history, run
+from patchlaw.multiscale import Scene, read_contact, read_history, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.results.files import csv_rows
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 from patchlaw.support.files import csv_text
 
 TILTED = ["load.tilt=[1e-3, 0.0]", "output.check=last"]

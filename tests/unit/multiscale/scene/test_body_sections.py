@@ -2,7 +2,7 @@
 
 import pytest
 
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SURFACE = {**SAMPLE, "lengths": ["1 mm", "1 mm"]}

@@ -8,11 +8,11 @@ from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ra
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.scene.scene import MOST_BYTES, Scene
+from patchlaw.multiscale.scene.scene import MOST_BYTES
 from patchlaw.multiscale.scene.surfaces import make_surface
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

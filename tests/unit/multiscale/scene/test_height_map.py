@@ -5,10 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import run
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.scene.surfaces import make_surface
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def scene(heights, **surface):

@@ -5,8 +5,9 @@ import re
 import numpy as np
 import pytest
 
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene import scene as module
-from patchlaw.multiscale.scene.scene import Scene, changes, content_digest, identity, told
+from patchlaw.multiscale.scene.scene import changes, content_digest, identity, told
 from patchlaw.multiscale.scene.schema import scene_keys
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}

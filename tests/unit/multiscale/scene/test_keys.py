@@ -7,7 +7,7 @@ from typing import get_args, get_type_hints
 import pydantic
 import pytest
 
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene.schema import (
     bare_quantities,
     described,
@@ -16,7 +16,7 @@ from patchlaw.multiscale.scene.schema import (
     read,
     scene_keys,
 )
-from patchlaw.support.arguments import key_of
+from patchlaw.support import key_of
 
 GIVEN = {
     "surface": {

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale import CellContact, Scene, make_setup, run
 from patchlaw.multiscale.models.problem import plane_at_largest_load
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

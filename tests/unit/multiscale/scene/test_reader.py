@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 import pytest
 
 from patchlaw.multiscale.scene.schema import described, model_of, read, to_dict
-from patchlaw.support.arguments import KEY, Length, Limits, PositiveLength, Unit
-from patchlaw.support.errors import InputError
+from patchlaw.support import KEY, InputError, Length, Limits, PositiveLength, Unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

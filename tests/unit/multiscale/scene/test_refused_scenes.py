@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 STEEL = {"young_modulus": "210 GPa", "poisson_ratio": 0.3}

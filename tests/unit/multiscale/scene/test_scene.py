@@ -8,10 +8,9 @@ import numpy as np
 import pint
 import pytest
 
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.scene.schema import scene_schema
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

@@ -7,10 +7,8 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.runs.scene_run import run
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale import Scene, make_setup, run
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL_SLOPES = ["micro.finite_slopes=false", "load.steps=2", "output.check=none"]

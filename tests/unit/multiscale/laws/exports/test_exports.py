@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.geometry import Friction, PatchGrid, Regions
 from patchlaw.geometry.materials import mindlin_ratio
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.multiscale import LawTable, PatchLaw, export_laws
 from patchlaw.multiscale.laws import FORMATS
-from patchlaw.multiscale.laws.export import export_laws, remove_exports
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.export import remove_exports
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.laws.sampling import LEAST_PRESSURE, sample_law
 from patchlaw.support.files import LIST

@@ -3,10 +3,8 @@
 import pytest
 
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.readable import Caution
-from patchlaw.multiscale.runs.scene_run import run
-from patchlaw.multiscale.scene.scene import Scene
 
 
 def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):

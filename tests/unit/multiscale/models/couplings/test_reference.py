@@ -15,7 +15,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.results.accuracy import reference_record
 from patchlaw.multiscale.results.figures.contact import pressure_figure
 from patchlaw.multiscale.results.figures.curves import history_figure
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 COARSE = [

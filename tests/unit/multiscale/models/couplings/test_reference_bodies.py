@@ -5,7 +5,7 @@ import pytest
 from helpers.box_msh import write_box
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 ELASTIC = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}

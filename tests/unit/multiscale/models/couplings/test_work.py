@@ -6,8 +6,7 @@ import tracemalloc
 
 import pytest
 
-from patchlaw.multiscale import Run, Scene, make_setup
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale import LoadHistory, Run, Scene, make_setup
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):

@@ -12,8 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.geometry import Spectrum, mirrored, synthesise
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, Spectrum, mirrored, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.loading.load_step import COLUMNS
@@ -23,7 +22,7 @@ from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.multiscale.runs.output.results_folder import checkpoint_of
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):

@@ -8,8 +8,7 @@ import pytest
 from helpers.box_msh import write_box
 from scipy.stats import norm
 
-from patchlaw.geometry import BlockShape
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import samples as law_errors
@@ -21,7 +20,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     omission_notes,
 )
 from patchlaw.multiscale.readable import quantity
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks

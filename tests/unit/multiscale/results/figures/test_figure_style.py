@@ -9,8 +9,7 @@ from matplotlib import rc_context, rcParams
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
-from patchlaw.geometry import PatchGrid, Spectrum, synthesise
-from patchlaw.geometry.statistics import roughness
+from patchlaw.geometry import PatchGrid, Spectrum, roughness, synthesise
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.contact import draw_gaps
 from patchlaw.multiscale.results.figures.curves import draw_points

@@ -16,7 +16,7 @@ from patchlaw.multiscale.runs import refining
 from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.output.results import provenance
 from patchlaw.multiscale.runs.resolving import SOLUTIONS_OF_LAWS, chosen_coupling
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
 STATED = {

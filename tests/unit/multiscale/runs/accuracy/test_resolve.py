@@ -9,7 +9,7 @@ import pytest
 
 from patchlaw.multiscale import Scene, make_setup, resolve, run
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def scene(source=None, **sections):

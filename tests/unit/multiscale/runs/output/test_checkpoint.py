@@ -23,7 +23,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
     find_checkpoint,
     read_checkpoint,
 )
-from patchlaw.support.errors import InputError, NotConverged, NotWritten
+from patchlaw.support import InputError, NotConverged, NotWritten
 from patchlaw.support.files import LIST, write_record
 
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"

@@ -10,11 +10,11 @@ from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.laws.law_table import read_laws
+from patchlaw.multiscale import read_laws
 from patchlaw.multiscale.results.files import csv_rows, result_of_a_run
 from patchlaw.multiscale.runs.cases import Journal
 from patchlaw.multiscale.runs.output.results_folder import is_finished, read_checkpoint
-from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support import InputError, NotWritten
 from patchlaw.support.files import checksum_hdf5, remove
 
 few = settings(

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from patchlaw.geometry.asperities import Asperities, find_asperities
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.spectrum import Spectrum, synthesise
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.geometry import Asperities, PatchGrid, Spectrum, find_asperities, synthesise
+from patchlaw.multiscale import History, LoadStep
+from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.results.figures.contact import contact_figure, contact_maps
 from patchlaw.multiscale.results.figures.curves import history_figure, wear_figure
 from patchlaw.multiscale.results.figures.style import draw_pressures
 from patchlaw.multiscale.results.figures.surface import MOST_SUMMITS, surface_figure
-from patchlaw.multiscale.results.history import History
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,11 @@ from types import SimpleNamespace
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.readable import percent, quantities
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.runs.output.report import _parted, citations, filled, report_html, results
 from patchlaw.multiscale.runs.output.results import provenance, write_results
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.scene.scene import Scene
 
 ROOT = Path(__file__).parents[5]
 PAPER = ROOT / "demos" / "scenes" / "paper.toml"

@@ -13,7 +13,7 @@ import pytest
 
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs.output.results_folder import FolderLock
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 

@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import compare
+from patchlaw.multiscale import Run, Scene, compare, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs import comparison
 from patchlaw.multiscale.runs.configurations import OWN, SMALL_SLOPES, configurations
-from patchlaw.multiscale.runs.scene_run import Run, run
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 from patchlaw.support.files import LIST
 
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"

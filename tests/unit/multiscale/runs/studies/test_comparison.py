@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import Comparison, Scene
 from patchlaw.multiscale.runs.cases import CaseResult
-from patchlaw.multiscale.runs.comparison import NO_ERRORS, Comparison, Row
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale.runs.comparison import NO_ERRORS, Row
+from patchlaw.support import InputError
 
 SCENE = Scene.from_dict(tomllib.loads(SMALL_SCENE))
 

@@ -5,10 +5,10 @@ import tomllib
 import numpy as np
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale import Comparison, Scene
 from patchlaw.multiscale.results.figures.studies import comparison_figure
 from patchlaw.multiscale.runs.cases import CaseResult
-from patchlaw.multiscale.runs.comparison import NO_ERRORS, Comparison, Row
-from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.runs.comparison import NO_ERRORS, Row
 
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 BASE = Scene.from_dict(tomllib.loads(SMALL_SCENE))

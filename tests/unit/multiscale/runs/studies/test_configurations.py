@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
+from patchlaw.multiscale import Scene, resolve
 from patchlaw.multiscale.runs.cases import CaseResult
 from patchlaw.multiscale.runs.comparison import Row, ranked, refinements, solved
 from patchlaw.multiscale.runs.configurations import (
@@ -17,9 +18,7 @@ from patchlaw.multiscale.runs.configurations import (
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.runs.resolving import resolve
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
-from patchlaw.multiscale.scene.scene import Scene
 
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 

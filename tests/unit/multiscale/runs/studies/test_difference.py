@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale import History, Scene, difference, run
+from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.multiscale import History, LoadStep, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.column import Leak
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.figures.studies import difference_over_pressure_figure
 from patchlaw.multiscale.results.run_curves import interpolated
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import wasserstein_distance
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.runs.comparison import ERRORS, error_measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles

@@ -10,13 +10,11 @@ from helpers.small_scene import SMALL_SCENE
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
 
-from patchlaw.multiscale import run, sweep
+from patchlaw.multiscale import Run, Scene, run, sweep
 from patchlaw.multiscale.cli import studies
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.runs.sweep import sweep_cases, values_from_text
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged
 from patchlaw.support.files import sealed, unsealed
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
