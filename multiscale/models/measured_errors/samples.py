@@ -221,7 +221,11 @@ class LawErrorProbe:
             Collective.
         """
         if not self.state.force:
-            return MeasuredErrors(by_cause=dict.fromkeys(self.causes, np.zeros(4)), stiffness=0.0)
+            errors = dict.fromkeys(self.causes, np.zeros(4))
+            force = 0.0 if self.problem.sliders else float(self._by_zero()[0])
+            if force:  # how far it would touch is not known
+                errors[ZERO] = np.array([force, math.inf, self.zero, math.inf])
+            return MeasuredErrors(by_cause=errors, stiffness=0.0, zero=self.zero)
         return self.of_force(self.answer_errors(), self.pressure_errors())
 
     def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
@@ -241,13 +245,15 @@ class LawErrorProbe:
         step, force = self.step, self.state.force
         # where elements and points change pressures, areas and stiffnesses change as these
         others = {cause: _MOVED * self._going_with(parts[cause] / force) for cause in answer}
+        others[ZERO] = np.zeros(3)
+        if step.by_force:
+            parts[ZERO] = self.response.stiffness * self.zero
         sums = self.response.sampling.patch_sums
         for cause, error in pressure.items():
             others[cause] = self._of_regions.get(cause, np.zeros(3))
             if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
                 share = self._going_with(float(sums(error).sum()) / force)
                 others[cause] = np.maximum(others[cause], share)
-        others[ZERO], parts[ZERO] = np.zeros(3), self.response.stiffness * self.zero
         if not step.by_force:  # besides, all go with the force
             others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
         sizes = [step.contact_area_fraction, 1.0, 1.0]
@@ -298,7 +304,8 @@ class LawErrorProbe:
 
         The first of an answer is the force at the approach.
         """
-        return dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+        found = dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+        return found | {ZERO: self._by_zero()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
@@ -429,6 +436,12 @@ class LawErrorProbe:
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
 
+    def _by_zero(self) -> Array:
+        """Return what the answer errs by as a held plane may be nearer by the error of the zero."""
+        if self.step.by_force or not self.zero:
+            return np.zeros_like(self.answer)
+        return np.abs(self.answer_on(self.face, nearer=self.zero) - self.answer)
+
     def by_points(self, finer: Any) -> Array:
         """Return what more quadrature points change in the answer, to first order.
 
@@ -446,13 +459,14 @@ class LawErrorProbe:
         """What discretisation may be off by: the force, shape (1,) [N]."""
         return np.array([self.state.force])
 
-    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
         """Return the answer on another face, under the same plane.
 
         Args:
             face: The face.
             same: Whether its meshes are the same. On more unknowns the answer is then that to first
                 order.
+            nearer: How much nearer the plane is [mm].
         """
         from patchlaw.macro.contact import other_elements as on
 
@@ -464,7 +478,7 @@ class LawErrorProbe:
                 return np.array([problem.first_order_force(*step)])
         else:
             problem.start_from(self.state.patch_pressure)
-        return np.array([problem.solve(self.control).force])
+        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
 
     # --- samples
 
@@ -584,6 +598,18 @@ class LawErrorProbe:
             found.append([state.approach, state.contact_area_fraction, state.mean_separation])
         nearer, area, gap = error_by_cells(*found)
         return np.array([nearer * float(law.stiffness(closure)) * surface.area, area, gap])
+
+
+def nearer_by(control: Control, distance: float) -> Control:
+    """Return a control whose plane is nearer, where its approach is held.
+
+    Args:
+        control: The control.
+        distance: How much nearer it is [mm].
+    """
+    if control.approach is None:
+        return control
+    return replace(control, approach=control.approach + distance)
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
