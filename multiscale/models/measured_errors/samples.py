@@ -272,22 +272,35 @@ class LawErrorProbe:
     def _going_with(self, share: float) -> Array:
         """Return what area, mean gap and stiffness err by where pressures do by a share, (3,).
 
-        Near full contact the area hardly grows with the pressure.
+        Near full contact the area hardly grows with the pressure, while gaps and stiffness where
+        the face bears little change more than all of it together.
         """
-        area = share
-        if math.isfinite(share) and (known := self._area(0.0)):
-            moved = max(abs(self._area(by) - known) for by in (share, -share))
-            area = min(share, moved / known)
-        return np.array([area, share / self._gaps_by, share])
+        errors = np.array([share, share / self._gaps_by, share])
+        if not math.isfinite(share) or not share:
+            return errors
+        known, sizes = self._read_off(0.0), np.ones(3)
+        moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
+        sizes[::2] = known[::2]
+        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
+        return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
 
-    def _area(self, share: float) -> float:
-        """Return the contact area by the laws once pressures are greater by a share [mm²]."""
+    def _read_off(self, share: float) -> Array:
+        """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
+
+        They are means over the face; collective.
+        """
         sampling = self.response.sampling
-        pressure, area = (1.0 + share) * self.state.sample_pressure, np.zeros(len(sampling.patch))
+        pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
+        closure, found = (
+            self._closures_under(pressure, sampling.patch),
+            np.zeros((3, len(pressure))),
+        )
         for region, law in enumerate(self.table.laws):
-            here, rows = sampling.patch == region, law.rows
-            area[here] = np.interp(pressure[here], rows.pressure, rows.contact_area_fraction)
-        return float(sampling.patch_sums(area).sum())
+            here = sampling.patch == region
+            point = law.at(closure[here], extend=True)
+            found[:, here] = point.contact_area_fraction, point.separation, point.stiffness
+        whole = sampling.patch_sums(np.ones_like(pressure)).sum()
+        return np.array([sampling.patch_sums(one).sum() for one in found]) / whole
 
     @property
     def causes(self) -> list[str]:
