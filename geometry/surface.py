@@ -317,14 +317,26 @@ class Zero:
         top = max(one.highest - one.mean_height for one in surfaces)
         return top - self._height(surfaces)
 
-    def error(self, surface: Surface) -> float:
+    def error(self, surfaces: Sequence[Surface]) -> float:
         """Return the error of the zero's height, as far as the heights' cells decide it [mm].
 
         That of first touch is what another interpolant, and the surface without its outer half
         cells, changes; those of a mean and of a quantile are what they are on every second cell.
+        Any of some samples may truly be the highest.
+
+        Args:
+            surfaces: The surface, or samples of it, whose mean planes are one plane.
         """
         if self.name == FIRST_TOUCH:
-            return _error_of_top(surface)
+            tops = [one.highest - one.mean_height for one in surfaces]
+            return max(
+                top - max(tops) + _error_of_top(one)
+                for top, one in zip(tops, surfaces, strict=True)
+            )
+        return float(np.mean([self._error_of(one) for one in surfaces]))
+
+    def _error_of(self, surface: Surface) -> float:
+        """Return the error of a mean's or quantile's height above the mean plane [mm]."""
         heights = surface.heights - surface.mean_height
         parts = [heights[i::2, j::2].ravel() for i in range(2) for j in range(2)]
         if self.name == MEAN_PLANE:  # opposite quarters, so that an inclination has none

@@ -259,7 +259,7 @@ class Search:
                 surface = make_surface(scene.with_({"surface.grid": cells}))
                 model = replace(model, surface=surface, highest=surface.highest)
                 path = loads_on(scene, (surface,), surface.area).path
-                probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
+                probe = replace(probe, zero=Zero(scene.loading.zero).error([surface]))
             else:
                 model = replace(model, surface=coupling.parts.surface).resampled(cells)
             errors = _measured(replace(probe, model=model), path)

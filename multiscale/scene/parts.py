@@ -271,7 +271,7 @@ class SceneParts:
     @cached_property
     def zero_error(self) -> float:
         """Error of that height [mm]."""
-        return Zero(self.scene.loading.zero).error(self.surface)
+        return Zero(self.scene.loading.zero).error(self.rough_surfaces)
 
     # --- contacts
 

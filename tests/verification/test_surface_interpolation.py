@@ -113,4 +113,4 @@ def test_highest_point_of_a_cut_surface_may_lie_on_its_border(seed):
     dense = whole.height_at(0.25 + t[:, None], t[None, :]).max()
     # the dense grid misses the top by 0.1 nm, a curvature of 3 /mm over half its spacing; the
     # heights of the part do not tell those of its border beyond the stated error, 20 nm at most
-    assert part.highest == pytest.approx(dense, abs=min(1.5 * Zero().error(part) + 1e-7, 2e-5))
+    assert part.highest == pytest.approx(dense, abs=min(1.5 * Zero().error([part]) + 1e-7, 2e-5))

@@ -221,7 +221,11 @@ class LawErrorProbe:
             Collective.
         """
         if not self.state.force:
-            return MeasuredErrors(by_cause=dict.fromkeys(self.causes, np.zeros(4)), stiffness=0.0)
+            errors = dict.fromkeys(self.causes, np.zeros(4))
+            force = 0.0 if self.problem.sliders else float(self._by_zero()[0])
+            if force:  # how far it would touch is not known
+                errors[ZERO] = np.array([force, math.inf, self.zero, math.inf])
+            return MeasuredErrors(by_cause=errors, stiffness=0.0, zero=self.zero)
         return self.of_force(self.answer_errors(), self.pressure_errors())
 
     def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
@@ -241,13 +245,15 @@ class LawErrorProbe:
         step, force = self.step, self.state.force
         # where elements and points change pressures, areas and stiffnesses change as these
         others = {cause: _MOVED * self._going_with(parts[cause] / force) for cause in answer}
+        others[ZERO] = np.zeros(3)
+        if step.by_force:
+            parts[ZERO] = self.response.stiffness * self.zero
         sums = self.response.sampling.patch_sums
         for cause, error in pressure.items():
             others[cause] = self._of_regions.get(cause, np.zeros(3))
             if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
                 share = self._going_with(float(sums(error).sum()) / force)
                 others[cause] = np.maximum(others[cause], share)
-        others[ZERO], parts[ZERO] = np.zeros(3), self.response.stiffness * self.zero
         if not step.by_force:  # besides, all go with the force
             others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
         sizes = [step.contact_area_fraction, 1.0, 1.0]
@@ -266,22 +272,35 @@ class LawErrorProbe:
     def _going_with(self, share: float) -> Array:
         """Return what area, mean gap and stiffness err by where pressures do by a share, (3,).
 
-        Near full contact the area hardly grows with the pressure.
+        Near full contact the area hardly grows with the pressure, while gaps and stiffness where
+        the face bears little change more than all of it together.
         """
-        area = share
-        if math.isfinite(share) and (known := self._area(0.0)):
-            moved = max(abs(self._area(by) - known) for by in (share, -share))
-            area = min(share, moved / known)
-        return np.array([area, share / self._gaps_by, share])
+        errors = np.array([share, share / self._gaps_by, share])
+        if not math.isfinite(share) or not share:
+            return errors
+        known, sizes = self._read_off(0.0), np.ones(3)
+        moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
+        sizes[::2] = known[::2]
+        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
+        return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
 
-    def _area(self, share: float) -> float:
-        """Return the contact area by the laws once pressures are greater by a share [mm²]."""
+    def _read_off(self, share: float) -> Array:
+        """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
+
+        They are means over the face; collective.
+        """
         sampling = self.response.sampling
-        pressure, area = (1.0 + share) * self.state.sample_pressure, np.zeros(len(sampling.patch))
+        pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
+        closure, found = (
+            self._closures_under(pressure, sampling.patch),
+            np.zeros((3, len(pressure))),
+        )
         for region, law in enumerate(self.table.laws):
-            here, rows = sampling.patch == region, law.rows
-            area[here] = np.interp(pressure[here], rows.pressure, rows.contact_area_fraction)
-        return float(sampling.patch_sums(area).sum())
+            here = sampling.patch == region
+            point = law.at(closure[here], extend=True)
+            found[:, here] = point.contact_area_fraction, point.separation, point.stiffness
+        whole = sampling.patch_sums(np.ones_like(pressure)).sum()
+        return np.array([sampling.patch_sums(one).sum() for one in found]) / whole
 
     @property
     def causes(self) -> list[str]:
@@ -298,7 +317,8 @@ class LawErrorProbe:
 
         The first of an answer is the force at the approach.
         """
-        return dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+        found = dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+        return found | {ZERO: self._by_zero()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
@@ -429,6 +449,12 @@ class LawErrorProbe:
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
 
+    def _by_zero(self) -> Array:
+        """Return what the answer errs by as a held plane may be nearer by the error of the zero."""
+        if self.step.by_force or not self.zero:
+            return np.zeros_like(self.answer)
+        return np.abs(self.answer_on(self.face, nearer=self.zero) - self.answer)
+
     def by_points(self, finer: Any) -> Array:
         """Return what more quadrature points change in the answer, to first order.
 
@@ -446,13 +472,14 @@ class LawErrorProbe:
         """What discretisation may be off by: the force, shape (1,) [N]."""
         return np.array([self.state.force])
 
-    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
         """Return the answer on another face, under the same plane.
 
         Args:
             face: The face.
             same: Whether its meshes are the same. On more unknowns the answer is then that to first
                 order.
+            nearer: How much nearer the plane is [mm].
         """
         from patchlaw.macro.contact import other_elements as on
 
@@ -464,7 +491,7 @@ class LawErrorProbe:
                 return np.array([problem.first_order_force(*step)])
         else:
             problem.start_from(self.state.patch_pressure)
-        return np.array([problem.solve(self.control).force])
+        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
 
     # --- samples
 
@@ -584,6 +611,18 @@ class LawErrorProbe:
             found.append([state.approach, state.contact_area_fraction, state.mean_separation])
         nearer, area, gap = error_by_cells(*found)
         return np.array([nearer * float(law.stiffness(closure)) * surface.area, area, gap])
+
+
+def nearer_by(control: Control, distance: float) -> Control:
+    """Return a control whose plane is nearer, where its approach is held.
+
+    Args:
+        control: The control.
+        distance: How much nearer it is [mm].
+    """
+    if control.approach is None:
+        return control
+    return replace(control, approach=control.approach + distance)
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:

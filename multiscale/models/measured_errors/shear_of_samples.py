@@ -42,6 +42,7 @@ from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
     PLACES,
     LawErrorProbe,
+    nearer_by,
     separation_of,
 )
 from patchlaw.multiscale.models.measured_errors.shear import (
@@ -152,7 +153,7 @@ class LawShearProbe(LawErrorProbe):
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
-        ordered = {cause: shear[cause] for cause in self.causes if cause in shear}
+        ordered = {cause: shear[cause] for cause in self.causes}
         return replace(self.of_force(answer, pressure), shear=ordered)
 
     @property
@@ -196,7 +197,7 @@ class LawShearProbe(LawErrorProbe):
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
-    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
         """Return the answer on another face, where the load step alone is solved again."""
         from patchlaw.macro.contact import other_elements as on
 
@@ -211,7 +212,7 @@ class LawShearProbe(LawErrorProbe):
                 return self._answer_of(*problem.first_order_step(*step))
         else:
             problem.start_from(self.state.patch_pressure)
-        found = problem.solve(control)
+        found = problem.solve(nearer_by(control, nearer))
         return self._answer_of(found.approach, found.force, found.shear)
 
     def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
@@ -435,7 +436,8 @@ class LawShearProbe(LawErrorProbe):
                 state, shear = self._gone((number, sample, grid), *on_cells, controls)
             except NotConverged:
                 continue
-            end = np.array(shear.force) / state.force if self.by_shift else shear.shift
+            # a sample that does not touch where others do counts for nothing
+            end = np.array(shear.force) / (state.force or 1.0) if self.by_shift else shear.shift
             found[row] = state.force, state.approach - approach, *end, shear.dissipated
         return found
 

@@ -105,7 +105,7 @@ def test_the_stated_error_of_first_touch_holds(make, n):
         true = make(5 * n, seed, 8).max()
         # the finer cells miss the top by 5 nm at most: curvature 2 /mm over half a cell of 1.6 µm
         error = abs(coarse.highest - true) - 5e-6
-        kept.append(error <= 1.5 * Zero().error(coarse))
+        kept.append(error <= 1.5 * Zero().error([coarse]))
     assert sum(kept) >= 13  # 95 of 100, with what 15 scatter
 
 
@@ -118,7 +118,7 @@ def test_the_error_of_first_touch_knows_no_order_of_the_axes(periodic, step):
         heights = np.round(heights / step) * step if step else heights
         one = Surface(heights=heights, lengths=(1.0, RATE), periodic=periodic)
         other = Surface(heights=heights.T, lengths=(RATE, 1.0), periodic=periodic)
-        assert Zero().error(one) == pytest.approx(Zero().error(other), rel=1e-9)  # rounding
+        assert Zero().error([one]) == pytest.approx(Zero().error([other]), rel=1e-9)  # rounding
 
 
 @pytest.mark.parametrize("n", [64, 80])
@@ -148,3 +148,10 @@ def test_heights_on_the_border_are_bounded_by_those_beside_it(seed):
     turned = Surface(heights=heights.T, lengths=(2.0, RATE))
     x, y = RNG.uniform(0.0, [RATE, 2.0], (50, 2)).T
     np.testing.assert_allclose(turned.height_at(y, x), rough.height_at(x, y), rtol=1e-9, atol=1e-9)
+
+
+def test_any_sample_may_be_the_highest():
+    samples = [surface(seed=seed) for seed in range(3)]
+    tops = [one.highest - one.mean_height for one in samples]
+    ends = [top + Zero().error([one]) for top, one in zip(tops, samples, strict=True)]
+    assert Zero().error(samples) == pytest.approx(max(ends) - max(tops), rel=1e-12)

@@ -172,6 +172,35 @@ def test_the_error_of_the_zero_is_a_cause():
     )
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("sections", [{}, {"friction": {"coefficient": 0.37}}])
+def test_the_zero_of_laws_of_samples_is_a_cause(sections):
+    """A plane nearer by its error bears as much more; where it rubs, it shears as much more."""
+
+    def last(approach):
+        load = {"approach": f"{approach!r} mm"}
+        if sections:
+            load |= {"shear": [[3e-4, 0.0]], "shear_steps": 1}
+        law = {"kind": "representative", "seeds": [2, 5]}
+        block = {"lengths": ["5 mm", "5 mm"]}
+        of_few = {"grid": [14, 14]}  # cells, whose top is hardly known
+        given = scene(
+            "first touch", "", law=law, block=block, load=load, surface=of_few, **sections
+        )
+        run_ = Run(given)
+        *_, step = run_.load_steps()
+        return step, run_.coupling.parts.zero_error
+
+    step, error = last(0.5 * UP)
+    nearer, _ = last(0.5 * UP + error)
+    assert error > 1e-2 * step.approach_mm
+    # laws are tabulated as far as each needs
+    assert dict(step.errors)["zero"] == pytest.approx(nearer.force_N - step.force_N, rel=2e-2)
+    if sections:
+        more = nearer.shear_force_x_N - step.shear_force_x_N
+        assert 0.9 * more < dict(step.shear_errors)["zero"] < 2.0 * more
+
+
 def test_a_step_counted_from_a_height_and_back_is_the_step():
     step = run(scene("first touch")).steps[0]
     again = step.counted_from(0.125).counted_from(-0.125)
