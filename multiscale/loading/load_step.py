@@ -261,8 +261,9 @@ class LoadStep(Displayed):
         error="mean_worn_depth_error_mm",
     )  # fmt: skip
     worn_depth_mm: float | None = column(
-        "Largest worn depth", "mm", heading="worn depth", in_report="largest worn depth",
-        error="worn_depth_error_mm",
+        "Largest worn depth of a cell; under laws that of a point of the face or of a patch, the "
+        "mean of its cells, of which the deepest lie several times as deep",
+        "mm", heading="worn depth", in_report="largest worn depth", error="worn_depth_error_mm",
     )  # fmt: skip
     thermal_conductance_error_W_per_K: float | None = column(
         "Error of the thermal conductance", "W/K"
