@@ -30,6 +30,11 @@ LOOSE = (
     "leak, are any of many"
 )
 """What a load step warns of where the equilibrium leaves the tilt open."""
+CLEAR = (
+    "the plane, free to tilt, presses nothing at this approach: it stays as it came clear of the "
+    "face, and its tilt, and with it gaps and mean separation, are any of many"
+)
+"""The same on faces of meshes. Over cells and whole patches that of largest clearance counts."""
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
 _NO_GAP = 1e-15
@@ -89,7 +94,7 @@ class LoadStep(Displayed):
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
         warnings: Why the micro model, where it was solved itself, is outside its range of
-            validity, or that nothing holds the plane (`LOOSE`); empty otherwise.
+            validity, or that nothing holds the plane (`LOOSE`, `CLEAR`); empty otherwise.
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
             the last mesh is the finest, whose results the step has. Empty with other couplings.
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
