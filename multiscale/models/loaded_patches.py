@@ -12,6 +12,8 @@ import scipy
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.rigid_plane import PlaneLevers, way_of_approach
+from patchlaw.micro.complementarity.admissible_start import clearance
+from patchlaw.micro.complementarity.cell_problem import Motions
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 from patchlaw.multiscale.laws.patch_law import PatchLaws
@@ -24,6 +26,8 @@ touch rounding changes closures by more than that, and the residual is relative 
 
 _LEAST_AGREEING = 0.5
 """Ratio of what a patch bears more by its gap and by its pressure within which the first counts."""
+_OUT_OF_REACH = 10.0
+"""Gap of patches that cannot be touched, over the largest of the others."""
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
 
 
@@ -110,6 +114,7 @@ class LoadedPatches:
     ) -> None:
         check_compliance(compliance, patches.count)
         self.laws, self.compliance, self.control = laws, compliance, control
+        self.patches = patches
         self.area = patches.area
         x, y = patches.centres.T
         self.levers = PlaneLevers.at(x, y, patches.lengths, centre=patches.middle)
@@ -208,6 +213,30 @@ class LoadedPatches:
         largest = max(self._largest_touch(), float(np.abs(closures).max()))
         approach -= 2.0 * TOLERANCE * largest  # so that a residual is not a contact
         return Control(approach=approach, tilt=(float(plane[1]), float(plane[2])))
+
+    def turned_clear(self) -> DenseState | None:
+        """Return the state of a plane that no load turns where it comes clear of all patches.
+
+        Of the slopes at which it touches nothing, those count at which it is farthest from the
+        nearest patch, as over cells. None where the slopes are prescribed, or patches hold it.
+        """
+        control, patches = self.control, self.patches
+        if control.tilt is not None or any(control.moment):
+            return None
+        x, y = np.moveaxis(patches.centres - patches.middle, 1, 0).reshape(2, *patches.grid)
+        turns = np.array([False, *(count > 1 for count in patches.grid)])
+        motions = Motions.of_plane(x[:, 0], y[0], turns, np.zeros(3), self.levers.half)
+        plane = control.prescribed(np.zeros(3))
+        above = plane[0] - self.laws.first_touch
+        size = float(np.abs(above[np.isfinite(above)]).max(initial=0.0))
+        above = np.maximum(above, -_OUT_OF_REACH * size).reshape(patches.grid)
+        if not turns.any():
+            return None if above.max() > 0.0 else self.at(self.levers.matrix @ plane, plane)
+        clear = clearance(above, motions)
+        if clear.interference > 0.0:
+            return None
+        plane[turns] = motions.unit * clear.motion
+        return self.at(self.levers.matrix @ plane, plane)
 
     def initial_guess(self, plane: Array) -> tuple[Array, Array]:
         """Return one common approach of all laws, and the plane, that fit the load on average.

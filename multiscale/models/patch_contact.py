@@ -201,7 +201,8 @@ def equilibrium(
     is a function of closure. Where the plane's force is prescribed, or its moment is zero, its
     approach and slopes are unknowns beside s, eliminated by Schur's complement. Steps are halved
     until the residual falls below the largest of the last few (Grippo, Lampariello & Lucidi 1986,
-    doi 10.1137/0723046). A plane that nothing supports moves on to the next touch.
+    doi 10.1137/0723046). A plane that nothing supports moves on to the next touch. Without a load,
+    one that can turn clear of all patches turns to where it is farthest from the nearest.
 
     Args:
         laws: The laws.
@@ -218,6 +219,8 @@ def equilibrium(
     """
     problem = LoadedPatches(laws, compliance, patches, control)
     plane = np.zeros(3) if start is None else start.plane
+    if control.force is None and (clear := problem.turned_clear()) is not None:
+        return clear
     if control.force == 0.0:
         problem.control = problem.first_touch(plane)
     plane = problem.control.prescribed(plane)

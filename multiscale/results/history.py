@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.loading.column import Column, unknown_column
-from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
+from patchlaw.multiscale.loading.load_step import CLEAR, COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
@@ -305,9 +305,11 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
         steps: The load steps.
         table: The patch laws; None where the micro model is solved itself.
     """
-    if loose := [step.step for step in steps if LOOSE in step.warnings]:
-        yield Caution(f"load step {loose[0]}{' and others' * (len(loose) > 1)}: {LOOSE}")
-    known = ((step.step, text) for step in steps for text in step.warnings if text != LOOSE)
+    of_tilt = LOOSE, CLEAR
+    for text in of_tilt:
+        if loose := [step.step for step in steps if text in step.warnings]:
+            yield Caution(f"load step {loose[0]}{' and others' * (len(loose) > 1)}: {text}")
+    known = ((step.step, one) for step in steps for one in step.warnings if one not in of_tilt)
     outside = dict(known)
     if table is not None:
         limit = np.array([law.warning_pressure for law in table.laws])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, root
+from scipy.optimize import brentq, linprog, root
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.multiscale.models.loaded_patches import LoadedPatches
@@ -134,6 +134,23 @@ def test_plane_that_touches_nothing_carries_nothing():
     state = equilibrium(laws, compliance(), PATCHES, Control(approach=4e-3, tilt=None))
     assert not state.point.pressure.any()
     np.testing.assert_allclose(state.point.closure, 4e-3, rtol=1e-12)  # the iteration's residual
+
+
+def test_a_plane_that_no_load_turns_is_farthest_from_its_nearest_patch():
+    """The programme of all patches at once; before the plane stopped wherever it was clear."""
+    laws, newton = HertzLaws(touches()), partial(equilibrium, HertzLaws(touches()), compliance())
+    known = np.isfinite(laws.first_touch)
+    rows = np.column_stack((LEVERS, -np.ones(16)))[known]
+    best = linprog([0.0, 0.0, 1.0], rows, 1e3 * laws.first_touch[known], bounds=(None, None))
+    highest, level = -1e-3 * best.fun, float(laws.first_touch.min())
+    pressed = newton(PATCHES, Control(approach=8.1e-3, tilt=None))
+    assert pressed.load[0] > 0.0 and level < highest
+    for start, share in ((None, 0.93), (pressed, 0.93), (pressed, 0.31), (None, -1.7)):
+        control = Control(approach=level + share * (highest - level), tilt=None)
+        state = newton(PATCHES, control, start)
+        assert not state.point.pressure.any()
+        np.testing.assert_allclose(state.plane[1:], 1e-3 * best.x[:2], rtol=1e-9)
+    assert newton(PATCHES, Control(approach=1.01 * highest, tilt=None)).point.pressure.any()
 
 
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS)

@@ -1,17 +1,21 @@
 """What a micro model says about its range reaches the history of a run, whatever the coupling."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers.along import respond
 
+from patchlaw import Scene, run
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import BodyModes, micro_model
 from patchlaw.multiscale import CellContact, consistent_laws, isolated_laws
+from patchlaw.multiscale.loading.load_step import CLEAR
 from patchlaw.multiscale.results.history import range_notes
 
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3
 LARGEST = Control(approach=END, tilt=(0.0, 0.0))
@@ -87,3 +91,19 @@ def test_models_that_see_cells_have_no_range(parts):
     table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
     assert all(law.warning_pressure == np.inf for law in table.laws)
     assert noted([step(1, *(law.rows.pressure[-1] for law in table.laws))], table) == []
+
+
+@pytest.mark.parametrize(
+    "interface", ["patchwise", pytest.param("pointwise", marks=pytest.mark.long)]
+)
+def test_a_free_plane_that_presses_nothing_has_one_tilt_or_says_so(interface):
+    """The summits of patches lie around the middle: between them a plane comes lower than one."""
+    small = ["surface.grid=[32, 32]", "block.cells=[4, 4, 3]", "patches.grid=[2, 2]"]
+    load = ["load.tilt=free", "load.approach=['0.5 um', '0.3 um']", "load.steps=1"]
+    words = [*small, *load, f"coupling.interface={interface}", "output.check=none"]
+    history = run(Scene.load(PAPER, words))
+    assert not any(history.force_N)
+    said = any(CLEAR in note for note in history.notes)
+    assert said == (interface == "pointwise")
+    (tilt, again) = (step.tilt for step in history.steps)
+    assert said or (tilt == pytest.approx(again, rel=1e-12) and any(tilt))
