@@ -49,8 +49,8 @@ _MOST_TOGETHER = 192**2
 """Cells up to which directions are solved together. More than that of one fill a core's cache."""
 _TOLERANCE, _MOST_ITERATIONS = 1e-7, 100
 """Iterations end when the last quarter of them, two at least, changed the flow by this part of it.
-That left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 % of them in
-contact, and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and 3 · 10⁻⁵ on
+That left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 % in contact,
+and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and 3 · 10⁻⁵ on
 a map that took 51 iterations. Beside conductivities so unlike that the flow is 10⁻⁸ of that through
 the widest cell, rounding leaves 2 · 10⁻⁶ of it, and 10⁻⁴ beside 10⁻¹⁰."""
 _IMBALANCE = 0.1
