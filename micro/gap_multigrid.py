@@ -52,7 +52,7 @@ _TOLERANCE, _MOST_ITERATIONS = 1e-7, 100
 That left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 % in contact,
 and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and 3 · 10⁻⁵ on
 a map that took 51 iterations. Beside conductivities so unlike that the flow is 10⁻⁸ of that through
-the widest cell, rounding leaves 2 · 10⁻⁶ of it, and 10⁻⁴ beside 10⁻¹⁰."""
+the widest cell, rounding leaves 10⁻⁶ to 3 · 10⁻⁵ of it, and 10⁻⁴ beside 10⁻¹⁰."""
 _IMBALANCE = 0.1
 """What enters and leaves cells may differ by this part of the flow then, summed over all of them.
 The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
