@@ -135,7 +135,8 @@ def body_request(
     """Return the memory that a body on a mesh takes: mesh, stiffness, multigrid and solve.
 
     Brake pads took 2350 B an unknown over all ranks (2.5·10⁵ unknowns) with P1, 1320 to 1560
-    (2·10⁵ to 10⁶) with P2, 4000 (1.9·10⁵) with Q1; an L took 2690 (1.3·10⁵) with Q2. Beside it rank
+    (2·10⁵ to 10⁶) with P2, 4000 (1.9·10⁵) with Q1; an L took 2690 (1.3·10⁵) with Q2, and factors
+    of the vertices of a cube 600 more than multigrid (2.9·10⁵). Beside it rank
     0 holds the file while gmsh reads it. Up to 32 earlier states start load steps, and the vectors
     of Newton's method took 107 B an unknown in two steps.
 
@@ -146,7 +147,7 @@ def body_request(
         steps: Load steps.
         in_parts: Its file is read by all ranks in parts, as ``.xdmf`` is, and not by rank 0 whole.
     """
-    each = {"P1": 2400, "P2": 1600, "Q1": 4200, "Q2": 2800}[element] + 8 * min(steps, 32) + 100
+    each = {"P1": 2400, "P2": 1600, "Q1": 4200, "Q2": 3400}[element] + 8 * min(steps, 32) + 100
     read = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}[element]
     return MemoryRequest(
         key=f"{key}.mesh",
