@@ -179,6 +179,35 @@ class FaceSliders:
         self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
         return found
 
+    def lines(self, respond: Callable[..., SliderResponse], moved: Array, closure: Array, pressure: Array, shear: Array, along: Array | float) -> ShearLines:
+        """Linearise the sliders where samples reach their curves, and a free plane shifts along."""
+        def at(shift: Array) -> ShearLines:
+            return shear_lines(respond, shift - self.preload - moved, closure, shear, along)
+        if not self.shifts:
+            return at(self._shift)
+        def softened(shift):
+            lines = at(shift)
+            found, k = lines.response, np.broadcast_to(along, len(moved))
+            yields = np.eye(2) + found.by_slip / k[:, None, None]
+            return found._replace(by_slip=solved(yields, found.by_slip), sticking=found.sticking / (1.0 + found.sticking / k))
+        most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
+        try:
+            self._shift, _ = find_shift(softened, self.total, self._shift, self._control, most)
+        except NotConverged:
+            found = respond(self._shift - self.preload - moved, sticks=True)
+            return ShearLines(found.slip, closure, found.stress, found)
+        return at(self._shift)
+
+    def on_lines(self, lines: ShearLines, moved: Array, closure: Array) -> Array:
+        """Return shear stresses on lines, the plane shifting where it is free to, (n, 2) [MPa]."""
+        found = lines.at(self.slip(moved), closure)
+        if self.shifts:
+            missing = np.array(self._control.shear.force) - self.total(found)
+            moves = self.total(lines.response.by_slip.reshape(-1, 4)).reshape(2, 2)
+            self._shift = self._shift + np.linalg.lstsq(moves, missing, rcond=_UNHELD)[0]
+            found = lines.at(self.slip(moved), closure)
+        return found
+
     @property
     def stress(self) -> Array:
         """Shear stresses of the latest load step, shape (n, 2) [MPa]."""
@@ -520,7 +549,7 @@ class ShearLines(NamedTuple):
 
 
 def shear_lines(
-    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: float
+    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: Array | float
 ) -> ShearLines:
     """Linearise sliders where samples reach their curves along the body's stiffness.
 
@@ -543,19 +572,19 @@ def shear_lines(
         stress: Predicted shear stresses, shape (n, 2) [MPa].
         along: Stiffness of the body [MPa/mm].
     """
-    stiff = along * np.eye(2)
+    along = np.broadcast_to(along, len(slip))[:, None]
+    stiff = along[..., None] * np.eye(2)
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
     left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
     for _ in range(_MOST_CURVE_STEPS):
-        at[left] -= solved(by_slip + stiff, excess[:, :, None])[:, :, 0]
+        at[left] -= solved(by_slip + stiff[left], excess[:, :, None])[:, :, 0]
         some = respond(at[left], rows=left)
         for values, new in zip(found, some, strict=True):
             values[left] = new
-        excess = some.stress - stress[left] + along * (at - slip)[left]
+        excess = some.stress - stress[left] + along[left] * (at - slip)[left]
         largest = np.abs(some.stress).max(initial=largest)
         off = (np.abs(excess) > _CLOSE * largest).any(axis=1)
         if not off.any():
             break
         left, excess, by_slip = left[off], excess[off], some.by_slip[off]
-    there = found.stress + np.einsum("nij,nj->ni", found.by_slip, slip - at)
-    return ShearLines(slip, closure, there, found)
+    return ShearLines(at, closure, found.stress, found)

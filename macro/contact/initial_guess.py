@@ -39,7 +39,7 @@ pressed to an approach by two laws took four steps along a path, in place of thr
 _NEAR_SLIDING = 0.05
 """The same with friction, where lines that touch sliders can go round in circles: a block under
 three laws of up to 0.1 µm took 7 to 9 steps a load, in place of 7 to 11."""
-_MOST_STEPS = 8
+_MOST_STEPS = 30
 _TOLERANCE, _ROUGHLY = 1e-4, 1e-3
 """Relative tolerance of linear solves, and that by a prescribed force in a first load or with
 friction, which took 5 to 10 % more iterations with 1e-4. Under a prescribed approach an error of
@@ -315,7 +315,7 @@ class FirstSteps:
         residuals = [self._relative_residual(displacement)]
         controls = [forces.control for forces in contacts]
         rubs = any(forces.sliders for forces in contacts)
-        near = _NEAR_SLIDING if rubs else NEAR
+        near = 1e-5
         if residuals[0] <= near or any(control.force == 0.0 for control in controls):
             return np.empty(0), 0
         best, step, spent = self._best, self._step, 0
@@ -384,7 +384,8 @@ class FirstSteps:
         if before.rest is not None:
             at_rest, moved = before.rest
             stiffness = forces.secant(pressure - at_rest, displaced - moved, stiffness)
-        return Start(closure, pressure, None, stiffness, before.rest)
+        shear = forces.shear_on_lines(displacement, closure)
+        return Start(closure, pressure, shear, stiffness, before.rest)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:
