@@ -44,7 +44,9 @@ _SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
 _ENOUGH = 1e-12
 """Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
-_MOST_CURVE_STEPS = 12
+_MOST_CURVE_STEPS, _LESS = 40, 0.5
+"""Steps of samples to their curves, and what one past the curve leaves at most of a residual: with
+whole steps springs a hundred times as stiff as the body went from slip to slip the other way."""
 _TINY = 1e-12
 """Least share of a change of the closure that laws of samples that wear see."""
 _FALLS = 0.1
@@ -573,18 +575,25 @@ def shear_lines(
         along: Stiffness of the body [MPa/mm].
     """
     along = np.broadcast_to(along, len(slip))[:, None]
-    stiff = along[..., None] * np.eye(2)
+    stiff, left = along[..., None] * np.eye(2), np.arange(len(slip))
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
-    left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
+    move = -solved(found.by_slip + stiff, (found.stress - stress)[..., None])[..., 0]
+    excess = np.full_like(slip, np.inf)
     for _ in range(_MOST_CURVE_STEPS):
-        at[left] -= solved(by_slip + stiff[left], excess[:, :, None])[:, :, 0]
-        some = respond(at[left], rows=left)
+        tried = at[left] + move[left]
+        some = respond(tried, rows=left)
+        now = some.stress - stress[left] + along[left] * (tried - slip[left])
+        # past the least energy along the step, which is halved where that does not help
+        past = (now * move[left]).sum(axis=1) > 0.0
+        good = ~past | (np.hypot(*now.T) < _LESS * np.hypot(*excess[left].T))
+        rows = left[good]
+        at[rows], excess[rows] = tried[good], now[good]
         for values, new in zip(found, some, strict=True):
-            values[left] = new
-        excess = some.stress - stress[left] + along[left] * (at - slip)[left]
+            values[rows] = new[good]
+        move[left] *= 0.5
+        move[rows] = -solved((found.by_slip + stiff)[rows], excess[rows, :, None])[..., 0]
         largest = np.abs(some.stress).max(initial=largest)
-        off = (np.abs(excess) > _CLOSE * largest).any(axis=1)
-        if not off.any():
+        left = left[(np.abs(excess[left]) > _CLOSE * largest).any(axis=1)]
+        if not len(left):
             break
-        left, excess, by_slip = left[off], excess[off], some.by_slip[off]
     return ShearLines(at, closure, found.stress, found)
