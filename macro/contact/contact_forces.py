@@ -19,7 +19,7 @@ from patchlaw.geometry import Control, Friction
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, RunningIn
-from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import Lines, Prediction, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
@@ -283,12 +283,16 @@ class ContactForces(PressedPlane):
     def _shear_lines(
         self, sliders: FaceSliders, displacement: PETSc.Vec, given: Prediction
     ) -> ShearLines:
-        """Return shear stresses as lines; see `write_lines`."""
+        """Return shear stresses as lines, at the points of the laws' curves that lines touch.
+
+        Pressures on the lines where displacements are now are no bounds of shear stresses: under
+        steep laws they are negative, or too large by orders of magnitude, before the next step.
+        """
         assert given.shear is not None
         closure, pressure, stiffness = given.lines
         respond = partial(sliders.at_slip, closure, np.maximum(pressure, 0.0), stiffness)
-        moved = self.along(displacement)
-        return sliders.lines(respond, moved, closure, pressure, given.shear, given.stiffness)
+        at = closure, pressure
+        return sliders.lines(respond, self.along(displacement), at, given.shear, given.stiffness)
 
     def write_shear_in(
         self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines

@@ -181,30 +181,58 @@ class FaceSliders:
         self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
         return found
 
-    def lines(self, respond: Callable[..., SliderResponse], moved: Array, closure: Array, pressure: Array, shear: Array, along: Array | float) -> ShearLines:
-        """Linearise the sliders where samples reach their curves, and a free plane shifts along."""
-        def at(shift: Array) -> ShearLines:
-            return shear_lines(respond, shift - self.preload - moved, closure, shear, along)
-        if not self.shifts:
-            return at(self._shift)
-        def softened(shift):
-            lines = at(shift)
-            found, k = lines.response, np.broadcast_to(along, len(moved))
-            yields = np.eye(2) + found.by_slip / k[:, None, None]
-            return found._replace(by_slip=solved(yields, found.by_slip), sticking=found.sticking / (1.0 + found.sticking / k))
-        most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
-        try:
-            self._shift, _ = find_shift(softened, self.total, self._shift, self._control, most)
-        except NotConverged:
-            found = respond(self._shift - self.preload - moved, sticks=True)
-            return ShearLines(found.slip, closure, found.stress, found)
-        return at(self._shift)
+    def lines(
+        self,
+        respond: Callable[..., SliderResponse],
+        moved: Array,
+        at: tuple[Array, Array],
+        shear: Array,
+        along: float,
+    ) -> ShearLines:
+        """Linearise the sliders where samples reach their curves, and a free plane shifts along.
+
+        Springs stick where pressures do not transmit the prescribed shear force yet.
+
+        Args:
+            respond: As for `shear_lines`.
+            moved: Displacements along the axes, shape (n, 2) [mm].
+            at: Closures [mm] and pressures [MPa] that laws are linearised at, shape (n,) each.
+            shear: Predicted shear stresses, shape (n, 2) [MPa].
+            along: Stiffness of the body [MPa/mm].
+        """
+        (closure, pressure), still = at, self.preload + moved
+
+        def lines(shift: Array) -> ShearLines:
+            return shear_lines(respond, shift - still, closure, shear, along)
+
+        def softened(shift: Array) -> SliderResponse:
+            found = lines(shift).response
+            by_slip = solved(np.eye(2) + found.by_slip / along, found.by_slip)
+            sticking = found.sticking / (1.0 + found.sticking / along)
+            return found._replace(by_slip=by_slip, sticking=sticking)
+
+        if self.shifts:
+            most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
+            start = self._shift, self._control, most
+            try:
+                self._shift, _ = find_shift(softened, self.total, *start)
+            except NotConverged:
+                found = respond(self._shift - still, sticks=True)
+                return ShearLines(found.slip, closure, found.stress, found)
+        return lines(self._shift)
 
     def on_lines(self, lines: ShearLines, moved: Array, closure: Array) -> Array:
-        """Return shear stresses on lines, the plane shifting where it is free to, (n, 2) [MPa]."""
+        """Return shear stresses on lines, the plane shifting where it is free to, (n, 2) [MPa].
+
+        Args:
+            lines: The lines.
+            moved: Displacements along the axes, shape (n, 2) [mm].
+            closure: Closures on the lines of pressures, shape (n,) [mm].
+        """
         found = lines.at(self.slip(moved), closure)
         if self.shifts:
-            missing = np.array(self._control.shear.force) - self.total(found)
+            assert self._shear.force is not None
+            missing = np.array(self._shear.force) - self.total(found)
             moves = self.total(lines.response.by_slip.reshape(-1, 4)).reshape(2, 2)
             self._shift = self._shift + np.linalg.lstsq(moves, missing, rcond=_UNHELD)[0]
             found = lines.at(self.slip(moved), closure)
@@ -551,7 +579,7 @@ class ShearLines(NamedTuple):
 
 
 def shear_lines(
-    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: Array | float
+    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: float
 ) -> ShearLines:
     """Linearise sliders where samples reach their curves along the body's stiffness.
 
@@ -564,7 +592,7 @@ def shear_lines(
 
     as pressures are (`law_lines`). A pad of P2 elements with laws of 1 µm took 8 to 10 steps a load
     step, in place of 21 to 25. From springs that all stick Newton's method comes to them from one
-    side.
+    side; where load steps before left stresses behind, steps past a curve are halved.
 
     Args:
         respond: The shear stresses at slips; with ``sticks=True`` those of springs that stick, with
@@ -574,15 +602,14 @@ def shear_lines(
         stress: Predicted shear stresses, shape (n, 2) [MPa].
         along: Stiffness of the body [MPa/mm].
     """
-    along = np.broadcast_to(along, len(slip))[:, None]
-    stiff, left = along[..., None] * np.eye(2), np.arange(len(slip))
+    stiff, left = along * np.eye(2), np.arange(len(slip))
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
     move = -solved(found.by_slip + stiff, (found.stress - stress)[..., None])[..., 0]
     excess = np.full_like(slip, np.inf)
     for _ in range(_MOST_CURVE_STEPS):
         tried = at[left] + move[left]
         some = respond(tried, rows=left)
-        now = some.stress - stress[left] + along[left] * (tried - slip[left])
+        now = some.stress - stress[left] + along * (tried - slip[left])
         # past the least energy along the step, which is halved where that does not help
         past = (now * move[left]).sum(axis=1) > 0.0
         good = ~past | (np.hypot(*now.T) < _LESS * np.hypot(*excess[left].T))
@@ -591,7 +618,7 @@ def shear_lines(
         for values, new in zip(found, some, strict=True):
             values[rows] = new[good]
         move[left] *= 0.5
-        move[rows] = -solved((found.by_slip + stiff)[rows], excess[rows, :, None])[..., 0]
+        move[rows] = -solved(found.by_slip[rows] + stiff, excess[rows, :, None])[..., 0]
         largest = np.abs(some.stress).max(initial=largest)
         left = left[(np.abs(excess[left]) > _CLOSE * largest).any(axis=1)]
         if not len(left):

@@ -198,7 +198,7 @@ class Start(NamedTuple):
     Attributes:
         closure: Closures of this rank's samples, shape (n,) [mm].
         pressure: Pressures that displacements follow from, shape (n,) [MPa].
-        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa]; None: those on the last lines.
+        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa]; None without friction.
         stiffness: That of the body under such pressures [MPa/mm].
         rest: Where the stiffness is to be found: pressures and displacements of the samples into
             the body that changes count from, shape (2, n); None: it is known.
