@@ -19,7 +19,7 @@ from patchlaw.geometry import Control, Friction
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, RunningIn
-from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import Lines, Prediction, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
@@ -263,39 +263,36 @@ class ContactForces(PressedPlane):
             load: Receives the nodal forces [N].
         """
         lines = given.lines
-        closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
-        pressure, sheared = lines.at(closure), None
         if self.sliders is not None:
-            at = closure, self.along(displacement), pressure, lines.stiffness
-            self._lines = sheared = self._shear_lines(self.sliders, at, given)
-        self.write_stresses(pressure, sheared and sheared.stress, load)
-        self.linearise(lines.stiffness, sheared and sheared.response)
+            self._lines = self._shear_lines(self.sliders, displacement, given)
+        closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
+        self.write_stresses(lines.at(closure), self.shear_on_lines(displacement, closure), load)
+        self.linearise(lines.stiffness, self._lines and self._lines.response)
 
-    def _shear_lines(
-        self, sliders: FaceSliders, at: tuple[Array, ...], given: Prediction
-    ) -> ShearLines:
-        """Return shear stresses as lines; see `write_lines`.
-
-        Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
+    def shear_on_lines(self, displacement: PETSc.Vec, closure: Array) -> Array | None:
+        """Return shear stresses on the latest lines, the plane shifting where free, (n, 2) [MPa].
 
         Args:
-            sliders: The sliders.
-            at: Closures, displacements along the face, pressures and stiffnesses of the samples.
-            given: As for `write_lines`.
+            displacement: Displacements of the body [mm].
+            closure: Closures on the lines, shape (n,) [mm].
         """
-        (closure, moved, pressure, stiffness), shear = at, given.shear
-        if sliders.shifts:
-            try:
-                found = sliders.respond(*at)
-            except NotConverged:
-                found = sliders.respond(*at, sticks=True)
-            return ShearLines(found.slip, closure, found.stress, found)
-        slip = sliders.slip(moved)
+        if self.sliders is None or self._lines is None:
+            return None
+        return self.sliders.on_lines(self._lines, self.along(displacement), closure)
+
+    def _shear_lines(
+        self, sliders: FaceSliders, displacement: PETSc.Vec, given: Prediction
+    ) -> ShearLines:
+        """Return shear stresses as lines, at the points of the laws' curves that lines touch.
+
+        Pressures on the lines where displacements are now are no bounds of shear stresses: under
+        steep laws they are negative, or too large by orders of magnitude, before the next step.
+        """
+        assert given.shear is not None
+        closure, pressure, stiffness = given.lines
         respond = partial(sliders.at_slip, closure, np.maximum(pressure, 0.0), stiffness)
-        if shear is None:
-            assert self._lines is not None
-            shear = self._lines.at(slip, closure)
-        return shear_lines(respond, slip, closure, shear, given.stiffness)
+        at = closure, pressure
+        return sliders.lines(respond, self.along(displacement), at, given.shear, given.stiffness)
 
     def write_shear_in(
         self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines

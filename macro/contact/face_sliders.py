@@ -44,7 +44,9 @@ _SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
 _ENOUGH = 1e-12
 """Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
-_MOST_CURVE_STEPS = 12
+_MOST_CURVE_STEPS, _LESS = 40, 0.5
+"""Steps of samples to their curves, and what one past the curve leaves at most of a residual: with
+whole steps springs a hundred times as stiff as the body went from slip to slip the other way."""
 _TINY = 1e-12
 """Least share of a change of the closure that laws of samples that wear see."""
 _FALLS = 0.1
@@ -177,6 +179,63 @@ class FaceSliders:
             return respond(self._shift)
         most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
         self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
+        return found
+
+    def lines(
+        self,
+        respond: Callable[..., SliderResponse],
+        moved: Array,
+        at: tuple[Array, Array],
+        shear: Array,
+        along: float,
+    ) -> ShearLines:
+        """Linearise the sliders where samples reach their curves, and a free plane shifts along.
+
+        Springs stick where pressures do not transmit the prescribed shear force yet.
+
+        Args:
+            respond: As for `shear_lines`.
+            moved: Displacements along the axes, shape (n, 2) [mm].
+            at: Closures [mm] and pressures [MPa] that laws are linearised at, shape (n,) each.
+            shear: Predicted shear stresses, shape (n, 2) [MPa].
+            along: Stiffness of the body [MPa/mm].
+        """
+        (closure, pressure), still = at, self.preload + moved
+
+        def lines(shift: Array) -> ShearLines:
+            return shear_lines(respond, shift - still, closure, shear, along)
+
+        def softened(shift: Array) -> SliderResponse:
+            found = lines(shift).response
+            by_slip = solved(np.eye(2) + found.by_slip / along, found.by_slip)
+            sticking = found.sticking / (1.0 + found.sticking / along)
+            return found._replace(by_slip=by_slip, sticking=sticking)
+
+        if self.shifts:
+            most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
+            start = self._shift, self._control, most
+            try:
+                self._shift, _ = find_shift(softened, self.total, *start)
+            except NotConverged:
+                found = respond(self._shift - still, sticks=True)
+                return ShearLines(found.slip, closure, found.stress, found)
+        return lines(self._shift)
+
+    def on_lines(self, lines: ShearLines, moved: Array, closure: Array) -> Array:
+        """Return shear stresses on lines, the plane shifting where it is free to, (n, 2) [MPa].
+
+        Args:
+            lines: The lines.
+            moved: Displacements along the axes, shape (n, 2) [mm].
+            closure: Closures on the lines of pressures, shape (n,) [mm].
+        """
+        found = lines.at(self.slip(moved), closure)
+        if self.shifts:
+            assert self._shear.force is not None
+            missing = np.array(self._shear.force) - self.total(found)
+            moves = self.total(lines.response.by_slip.reshape(-1, 4)).reshape(2, 2)
+            self._shift = self._shift + np.linalg.lstsq(moves, missing, rcond=_UNHELD)[0]
+            found = lines.at(self.slip(moved), closure)
         return found
 
     @property
@@ -533,7 +592,7 @@ def shear_lines(
 
     as pressures are (`law_lines`). A pad of P2 elements with laws of 1 µm took 8 to 10 steps a load
     step, in place of 21 to 25. From springs that all stick Newton's method comes to them from one
-    side.
+    side; where load steps before left stresses behind, steps past a curve are halved.
 
     Args:
         respond: The shear stresses at slips; with ``sticks=True`` those of springs that stick, with
@@ -543,19 +602,25 @@ def shear_lines(
         stress: Predicted shear stresses, shape (n, 2) [MPa].
         along: Stiffness of the body [MPa/mm].
     """
-    stiff = along * np.eye(2)
+    stiff, left = along * np.eye(2), np.arange(len(slip))
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
-    left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
+    move = -solved(found.by_slip + stiff, (found.stress - stress)[..., None])[..., 0]
+    excess = np.full_like(slip, np.inf)
     for _ in range(_MOST_CURVE_STEPS):
-        at[left] -= solved(by_slip + stiff, excess[:, :, None])[:, :, 0]
-        some = respond(at[left], rows=left)
+        tried = at[left] + move[left]
+        some = respond(tried, rows=left)
+        now = some.stress - stress[left] + along * (tried - slip[left])
+        # past the least energy along the step, which is halved where that does not help
+        past = (now * move[left]).sum(axis=1) > 0.0
+        good = ~past | (np.hypot(*now.T) < _LESS * np.hypot(*excess[left].T))
+        rows = left[good]
+        at[rows], excess[rows] = tried[good], now[good]
         for values, new in zip(found, some, strict=True):
-            values[left] = new
-        excess = some.stress - stress[left] + along * (at - slip)[left]
+            values[rows] = new[good]
+        move[left] *= 0.5
+        move[rows] = -solved(found.by_slip[rows] + stiff, excess[rows, :, None])[..., 0]
         largest = np.abs(some.stress).max(initial=largest)
-        off = (np.abs(excess) > _CLOSE * largest).any(axis=1)
-        if not off.any():
+        left = left[(np.abs(excess[left]) > _CLOSE * largest).any(axis=1)]
+        if not len(left):
             break
-        left, excess, by_slip = left[off], excess[off], some.by_slip[off]
-    there = found.stress + np.einsum("nij,nj->ni", found.by_slip, slip - at)
-    return ShearLines(slip, closure, there, found)
+    return ShearLines(at, closure, found.stress, found)

@@ -432,7 +432,7 @@ class Prediction(NamedTuple):
     Attributes:
         lines: Its laws as lines.
         stiffness: Stiffness of the body under all its samples [MPa/mm].
-        shear: Shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
+        shear: Shear stresses, shape (n, d − 1) [MPa]; None without friction.
     """
 
     lines: Lines

@@ -66,3 +66,26 @@ def test_the_plane_is_found_where_the_body_has_moved_far():
     exact = brentq(lambda at: stress(at).sum() - force, -1.0, 1.0, xtol=1e-15)
     assert shift[0] == pytest.approx(exact, abs=1e-9)
     assert found.stress.sum(axis=0) == pytest.approx([force, 0.0], abs=1e-6)
+
+
+def test_samples_reach_their_curves_from_stresses_that_earlier_steps_left():
+    """After unloading, whole steps go from slip to slip the other way on springs this stiff."""
+    n, along, law = 300, 60.0, RangedLaw(4e7, power=2.0, end=4e-3)
+    rng = np.random.default_rng(7)
+    sliders = Sliders([springs_of_law(law)], np.array([1.2]), np.zeros(n, int), 0.3)
+
+    def at(closure, before, slip):
+        return sliders.respond(before, closure, slip, law.pressure(closure), law.stiffness(closure))
+
+    high, low = rng.uniform(2e-3, 4e-3, n), rng.uniform(2e-4, 2e-3, n)
+    pressed = at(high, sliders.at_rest, rng.normal(0.0, 1e-3, (n, 2)))
+    before = sliders.step(sliders.at_rest, pressed).after
+
+    def respond(slip, *, sticks=False, rows=slice(None)):
+        here = low[rows], slip, law.pressure(low[rows]), law.stiffness(low[rows])
+        return sliders.respond(before, *here, sticks=sticks, rows=np.arange(n)[rows])
+
+    slip, stress = rng.normal(0.0, 0.1, (n, 2)), rng.normal(0.0, 3.0, (n, 2))
+    lines = shear_lines(respond, slip, low, stress, along)
+    left = lines.stress - stress + along * (lines.slip - slip)
+    assert np.abs(left).max() < 1e-3 * np.abs(lines.stress).max()
