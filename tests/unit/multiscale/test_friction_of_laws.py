@@ -161,7 +161,7 @@ def test_the_plan_says_friction_and_whether_errors_are_measured():
     assert "coefficient 0.3; the laws are beds of springs" in said["friction"]
     assert said["error"].endswith("body and laws; those of the shear as well")
     said = dict(make_setup(scene("representative", output={"check": "last"})).about.statements())
-    assert said["error"].endswith("slopes, edges; those of the shear as well")
+    assert said["error"].endswith("slopes, edges, zero; those of the shear as well")
     said = dict(make_setup(scene("representative")).about.statements())
     assert said["error"].endswith("output.check = 'none'")
 
