@@ -357,6 +357,7 @@ def stated_and_true(body, comm, *, refinements=2):
         problem_with=lambda face, table: problem_of(face),
         table=None,
         samples=(),
+        new_laws=(),
         cells=None,
         step=None,
         comm=comm,
