@@ -63,8 +63,8 @@ _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR with the rough face first, as a surface of element faces (TYPE=ELEMENT).
-Which TYPE: MORTAR, the safest: linear and quadratic elements, loading and unloading in any
-increments. Its printed reaction of the pressed part is 0: read the force where the body is held.
+Which TYPE: MORTAR, the safest: linear and quadratic elements, loads taken back as well. The
+printed reaction of the pressed part is 0 there: read the force where the body is held.
 NODE TO SURFACE only where rough faces share nodes, which MORTAR counts twice, or faces stick by
 friction, or a table says so; with C3D4, C3D8, C3D10, as C3D20 and C3D20R carry up to 2 % too
 little. It takes no gap from *CLEARANCE: place the faces as they are. Taken back in large
