@@ -6,7 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -211,22 +211,28 @@ def checked_reaction(
         exerted[:, 0] = sign * np.array([*shear, -force])
         size = np.array([1.0, body.size]) * max(abs(force), float(np.hypot(*shear)))
         left = np.abs(exerted + borne) / np.where(size > 0.0, size, 1.0)
-        axis, kind = np.unravel_index(np.argmax(left), left.shape)
-        if not left[axis, kind] <= allowed:
+        if not (left <= allowed).all():
+            worst = np.unravel_index(np.argmax(left), left.shape)
             owner = "body" if sign > 0.0 else "counter-body"
-            name, unit, around = _KINDS[kind]
             raise NotBalanced(
                 what,
-                reason=f"NOT_BALANCED: the supports of the {owner} bear a {name} of "
-                f"{borne[axis, kind]:.7g} {unit} {around}{_AXES[axis]}, against "
-                f"{-exerted[axis, kind]:.7g} {unit} by the contact, where {allowed:.1g} of "
-                f"{size[kind]:.4g} {unit} may be left over",
+                reason=f"NOT_BALANCED: the supports of the {owner} bear "
+                f"{_in_words(worst, borne, exerted)}, where {allowed:.1g} of "
+                f"{size[worst[1]]:.4g} may be left over",
                 iterations=iterations,
                 remedy="leave out PETSc's options that loosen tolerances; if there are none, these "
                 "results are wrong: please report the scene",
             )
         reactions.append(float(borne[2, 0]))
     return reactions[0]
+
+
+def _in_words(worst: tuple[Any, ...], borne: Array, exerted: Array) -> str:
+    """Return the part of a load on the supports, and of that on the contact, that differs most."""
+    axis, kind = worst
+    name, unit, around = _KINDS[kind]
+    against = f"against {-exerted[axis, kind]:.7g} {unit} by the contact"
+    return f"a {name} of {borne[axis, kind]:.7g} {unit} {around}{_AXES[axis]}, {against}"
 
 
 def _resultant(arms: Array, nodal: Array) -> Array:

@@ -316,11 +316,9 @@ class AsperityModel:
             displacement = displacement + points.patch_means(patches, contacts.force)
         separation = self.reference_height - plane.means(patches) - means + displacement
         patch_force, patch_area = patch_loads(patches, contacts)
+        peaks, share = 1.5 * contacts.force / contacts.area, area / float(np.prod(patches.lengths))
         spots = Spots(
-            place=contacts.position,
-            area=contacts.area,
-            force=contacts.force,
-            peak_pressure=1.5 * contacts.force / contacts.area,
+            place=contacts.position, area=contacts.area, force=contacts.force, peak_pressure=peaks
         )
         return ContactState(
             plane=plane,
@@ -334,9 +332,7 @@ class AsperityModel:
             iterations=solution.iterations,
             residual=solution.residual,
             overlapping_contacts=solution.overlapping_contacts,
-            warning=self._warning(
-                plane, area / float(np.prod(patches.lengths)), len(spots), solution
-            ),
+            warning=self._warning(plane, share, len(spots), solution),
             patch_force=patch_force,
             patch_area=patch_area,
             patch_contacts=spots.per_patch(patches),

@@ -65,50 +65,43 @@ def press_coupled(
         (1990), section 4.3.1 (Panagiotopoulos' process).
     """
     assert control.shear is not None
-    grid, mixing, products, change = normal.surface.grid, AndersonMixing(**_MIXING), 0, np.inf
+    grid, mixing, products = normal.surface.grid, AndersonMixing(**_MIXING), 0
     cross, first = friction.cross(grid) if friction.coupled else None, options.get("start")
     depth, worn = (None, None) if first is None else (first.plastic_depth, first.worn_depth)
     normal = wearing = normal if worn is None else normal.worn(worn)
-    heat = 0.0 if before is None else before.heat
-    displaced = across = off = np.zeros(grid)  # by tractions, and what wears off in the step
+    heat, shear = 0.0 if before is None else before.heat, before
+    displaced = across = np.zeros(grid)  # by tractions
     if cross is not None and before is not None:
         displaced = cross.across(before.traction)
-    shear = before
     for _ in range(_MOST_PASSES):
-        lifted = displaced if friction.coupled else None
-        state = wearing.press(control, displaced=lifted, **options)
+        state = wearing.press(control, displaced=displaced if friction.coupled else None, **options)
         shear = friction.advance(before, state.pressures, control.shear, near=shear)
         products += state.iterations + shear.products
         if cross is not None and shear.closed.any():
             across = cross.across(shear.traction)
-        off = friction.worn_by(shear.heat - heat)
-        seen = (
-            0.0 if state.worn_depth is None else state.worn_depth - (0.0 if worn is None else worn)
-        )
-        apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), abs(off - seen))
-        moved = state.displacement
-        assert moved is not None
-        change = float(apart.max() / max(np.abs(moved).max(), np.finfo(float).tiny))
+        off = friction.worn_by(shear.heat - heat)  # in the step
+        seen = sum_of(state.worn_depth, None if worn is None else -worn)
+        unseen = np.abs(off - (0.0 if seen is None else seen))
+        apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), unseen)
+        moved = float(np.abs(state.displacement).max())  # type: ignore[arg-type]
+        change = float(apart.max()) / max(moved, float(np.finfo(float).tiny))
         if change <= TOLERANCE:
-            break
+            state = replace(state, worn_depth=sum_of(worn, off) if friction.wear else worn)
+            return replace(state, iterations=products - shear.products), shear
         displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))
         if friction.wear:
             wearing = normal.wearing(
                 np.divide(off, state.pressures, out=np.zeros(grid), where=shear.closed)
             )
         options["start"] = replace(state.guess, plastic_depth=depth, worn_depth=worn)
-    else:
-        raise NotConverged(
-            f"pressures and tractions together (their displacements still change by {change:.1e})",
-            reason="they do not agree",
-            iterations=products,
-            remedy="take smaller load steps"
-            + ", or set friction.coupled = false" * friction.coupled
-            + ", or a smaller coefficient of wear" * bool(friction.wear),
-        )
-    if friction.wear:
-        state = replace(state, worn_depth=sum_of(worn, off))
-    return replace(state, iterations=products - shear.products), shear
+    raise NotConverged(
+        f"pressures and tractions together (their displacements still change by {change:.1e})",
+        reason="they do not agree",
+        iterations=products,
+        remedy="take smaller load steps"
+        + ", or set friction.coupled = false" * friction.coupled
+        + ", or a smaller coefficient of wear" * bool(friction.wear),
+    )
 
 
 def coupled_stiffness(

@@ -262,15 +262,10 @@ class HalfSpaceModel:
             patches: As for `press`.
             heights: Mean heights, as for `press`.
         """
-        surface, cell = self.surface, self.surface.spacing[0] * self.surface.spacing[1]
-        before, displaced = load.before, load.displaced
+        surface, before, displaced = self.surface, load.before, load.displaced
+        cell, energy, work = surface.spacing[0] * surface.spacing[1], np.nan, 0.0
         depth, worn = (None, None) if before is None else (before.plastic_depth, before.worn_depth)
-        pressure = solved.pressure.copy()
-        pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
-        short = min(_SHORT_OF_YIELDING * self.tolerance, _MOST_SHORT)
-        yielding = pressure >= (1.0 - short) * (self.hardness or np.inf)
-        displacement = gap = left = None
-        energy, work = np.nan, 0.0
+        (pressure, yielding), displacement, gap, left = self._borne(solved), None, None, None
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
             worn = sum_of(worn, self._worn_off(pressure))
@@ -284,23 +279,13 @@ class HalfSpaceModel:
             gap += anew
             left = anew if depth is None else depth + anew
             work = self.hardness * float(left.sum()) * cell
-        separation = self.reference_height - heights - plane.means(patches) + means
-        for lower in (worn, left):
-            if lower is not None:
-                separation += field_means(lower, surface.lengths, patches)
         return ContactState(
             plane=plane,
             patches=patches,
-            force=float(pressure.sum()) * cell,
             **sums_of(self, pressure, plane, patches),
-            mean_separation=float(np.average(separation, weights=patches.areas)),
+            **self._separations(plane, patches, heights, means, sum_of(worn, left)),
             iterations=solved.iterations,
             residual=solved.residual,
-            patch_displacement=means,
-            patch_separation=separation,
-            x=surface.x,
-            y=surface.y,
-            pressure=pressure,
             gap=gap,
             displacement=displacement,
             yielding=yielding,
@@ -312,6 +297,28 @@ class HalfSpaceModel:
             by_slopes=solved.by_slopes,
             displaced=displaced,
         )
+
+    def _borne(self, solved: ContactPressures) -> tuple[Array, Flags]:
+        """Return pressures without what is rounding, and which of them are the hardness."""
+        pressure = solved.pressure.copy()
+        pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
+        short = min(_SHORT_OF_YIELDING * self.tolerance, _MOST_SHORT)
+        return pressure, pressure >= (1.0 - short) * (self.hardness or np.inf)
+
+    def _separations(
+        self,
+        plane: RigidPlane,
+        patches: PatchGrid,
+        heights: Array,
+        means: Array,
+        lowered: Array | None,
+    ) -> dict[str, Any]:
+        """Return mean displacements and gaps of patches, by the names that `ContactState` has."""
+        gaps = self.reference_height - heights - plane.means(patches) + means
+        if lowered is not None:
+            gaps += field_means(lowered, self.surface.lengths, patches)
+        mean = float(np.average(gaps, weights=patches.areas))
+        return {"mean_separation": mean, "patch_displacement": means, "patch_separation": gaps}
 
     def _fields(
         self, solved: ContactPressures, pressure: Array, below: Array, displaced: Array | None

@@ -365,7 +365,7 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
 def sums_of(
     model: ModelOfCells, pressure: Array, plane: RigidPlane, patches: PatchGrid
 ) -> dict[str, Any]:
-    """Return what pressures and their spots sum up to, by the names that `ContactState` has.
+    """Return pressures, and sums of them and their spots, by the names that `ContactState` has.
 
     Args:
         model: The surface and what it lies on.
@@ -379,6 +379,10 @@ def sums_of(
     cell = surface.spacing[0] * surface.spacing[1]
     moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
     return {
+        "x": surface.x,
+        "y": surface.y,
+        "pressure": pressure,
+        "force": cell * float(pressure.sum()),
         "moment": (cell * moment_x, cell * moment_y),
         "contact_area": float(spots.area.sum()),
         "contacts": len(spots),
