@@ -29,36 +29,23 @@ def _check_known(interface: Interface) -> None:
     Raises:
         InputError: With what serves them.
     """
-    if interface.displacements.dimension == 2 or interface.displacements.taken is not None:
-        raise InputError(
-            "an external operator knows displacements alone, on meshes of three dimensions",
-            key="space",
-            allowed="such a space; or Interface.add_residual and ContactProblem",
-        )
-    if interface.mode != "pointwise":
-        raise InputError(
-            "an external operator holds at points", value=interface.mode, allowed="pointwise"
-        )
-    if interface.forces.sliders is not None:
-        raise InputError(
-            "an external operator knows pressures alone",
-            key="friction",
-            value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
-            allowed="no friction; or Interface.add_residual and ContactProblem",
-        )
-    if interface.wears:
-        raise InputError(
-            "an external operator knows no wear",
-            key="wear",
-            allowed="none; or Interface.add_residual and ContactProblem",
-        )
-    if interface.opposite is not None:
-        raise InputError(
-            "an external operator knows the displacements of one face alone",
-            key="opposite",
-            value=interface.opposite,
-            allowed="a plane; or Interface.add_residual and ContactProblem",
-        )
+    displacements = interface.displacements
+    other_space = displacements.dimension == 2 or displacements.taken is not None
+    for unknown, problem, key in (
+        (other_space, "knows displacements alone, on meshes of three dimensions", "space"),
+        (interface.mode != "pointwise", "holds at points", "mode"),
+        (interface.forces.sliders is not None, "knows pressures alone", "friction"),
+        (interface.wears, "knows no wear", "wear"),
+        (interface.opposite is not None, "knows the displacements of one face alone", "opposite"),
+        (not isinstance(interface.patches, PatchGrid), "knows no laws by zone", "laws"),
+    ):
+        if unknown:
+            raise InputError(
+                f"an external operator {problem}",
+                key=key,
+                value=interface.opposite if key == "opposite" else None,
+                allowed="another interface; or Interface.add_residual and ContactProblem",
+            )
 
 
 class LawsAtPoints:
@@ -82,9 +69,8 @@ class LawsAtPoints:
         flat = np.reshape(points, (-1, 3))
         places = interface.frame.in_plane(flat)
         self._x, self._y = places.T
-        if not isinstance(interface.patches, PatchGrid):
-            raise InputError("external operators know no laws by zone", allowed="an operator each")
-        patches, lower = interface.patches, np.array(interface.patches.origin)
+        patches: Any = interface.patches
+        lower = np.array(patches.origin)
         self._inside = np.all((places >= lower) & (places <= lower + patches.lengths), axis=1)
         self._patch = np.zeros(len(flat), dtype=np.intp)
         self._patch[self._inside] = patches.index_of(*places[self._inside].T)
