@@ -71,7 +71,7 @@ from scipy import sparse
 from scipy.linalg import block_diag
 
 from patchlaw.macro import compat
-from patchlaw.macro.linear_solvers.multigrid import coarser_grids
+from patchlaw.macro.linear_solvers.multigrid import algebraic_grids, coarser_grids
 from patchlaw.macro.linear_solvers.node_matrices import (
     Stiffened,
     block_diagonal,
@@ -94,7 +94,6 @@ from patchlaw.macro.linear_solvers.solvers import (
     MARGINS,
     CoarserGrid,
     LinearSolver,
-    algebraic_grids,
     linear_solver,
     pointwise,
 )

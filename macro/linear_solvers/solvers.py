@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -12,7 +11,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
-from patchlaw.macro.linear_solvers.node_matrices import block_diagonal, diagonal_blocks
 from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     GEOMETRIC_DEFAULTS,
@@ -343,7 +341,7 @@ def linear_solver(
     with default_options(prefix, usual):
         solver.setFromOptions()
         if made_of is not matrix and solver.pc.getType() == "hypre":
-            made_of = _hypres(made_of)  # else hypre's own copy would stand beside this one
+            made_of = as_hypres(made_of)  # else hypre's own copy would stand beside this one
             solver.setOperators(matrix, made_of)
         set_up(solver)  # multigrid reads the options of its levels here
     if made_of is not matrix:
@@ -351,66 +349,6 @@ def linear_solver(
         solver.setOperators(matrix)
         made_of.destroy()  # preconditioners that need it still hold it
     return solver
-
-
-def algebraic_grids(matrix: PETSc.Mat, options: Mapping[str, object]) -> list[CoarserGrid]:
-    """Return the coarser grids that hypre makes of a matrix, finest first.
-
-    hypre's hierarchy is taken over without its copy of the matrix, and without its cycle: products
-    with blocks of 3 × 3, half of them stored, move a third of the bytes of hypre's sweeps.
-
-    Args:
-        matrix: Symmetric positive definite.
-        options: Those of hypre; PETSc's options of the user win.
-
-    Note:
-        Collective.
-    """
-    maker, whole = PETSc.PC().create(matrix.comm), _hypres(pointwise(matrix))
-    maker.setOptionsPrefix(PREFIX)
-    maker.setOperators(whole)
-    with default_options(PREFIX, options):
-        maker.setFromOptions()
-        maker.setUp()
-        by_nodes = PETSc.Options(PREFIX).getInt("pc_hypre_boomeramg_nodal_coarsen", 0) > 0
-    parts = [_taken(maker, f"PCGet{kind}") for kind in ("Interpolations", "CoarseOperators")]
-    for one in (maker, whole):
-        one.destroy()
-    sizes = [coarse.getSize()[0] for coarse in parts[1]]
-    last = next((k for k, size in enumerate(sizes) if size <= COARSEST), len(sizes) - 1)
-    for one in (part for kind in parts for part in kind[last + 1 :]):
-        one.destroy()  # PETSc keeps objects that Python drops
-    grids: list[CoarserGrid] = []
-    for transfer, coarse in zip(*(kind[: last + 1] for kind in parts), strict=True):
-        matrix = _half(coarse) if by_nodes and len(grids) < last else coarse
-        blocks = diagonal_blocks(matrix, 3 if by_nodes else 1) if len(grids) < last else None
-        grids.append(
-            CoarserGrid(
-                transfer, matrix, None if blocks is None else block_diagonal(blocks, matrix.comm)
-            )
-        )
-    return grids
-
-
-def _half(matrix: PETSc.Mat) -> PETSc.Mat:
-    """Return the blocks of 3 × 3 on and above the diagonal of a matrix, and destroy it."""
-    matrix.setBlockSize(3)
-    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    half = matrix.convert("sbaij", PETSc.Mat())
-    matrix.destroy()
-    return half
-
-
-def _taken(maker: PETSc.PC, function: str) -> list[PETSc.Mat]:
-    """Return the matrices that a function of PETSc takes out of hypre, of finer grids first."""
-    count, array = ctypes.c_int(), ctypes.POINTER(ctypes.c_void_p)()
-    compat.call(function, ctypes.c_void_p(maker.handle), ctypes.byref(count), ctypes.byref(array))
-    found = []
-    for k in reversed(range(count.value - 1)):
-        matrix, given = PETSc.Mat().create(maker.comm), ctypes.c_void_p(array[k])
-        compat.call("MatHeaderReplace", ctypes.c_void_p(matrix.handle), ctypes.byref(given))
-        found.append(matrix)
-    return found
 
 
 def pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
@@ -423,7 +361,7 @@ def pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
     return copy
 
 
-def _hypres(matrix: PETSc.Mat) -> PETSc.Mat:
+def as_hypres(matrix: PETSc.Mat) -> PETSc.Mat:
     """Return a matrix as one of hypre's, and destroy it."""
     # converted in place, 3.18 keeps the entries twice
     other, size = matrix.convert("hypre", PETSc.Mat()), matrix.getBlockSize()
