@@ -120,50 +120,57 @@ class RepresentativeCoupling(Coupling):
         model = self.model
         assert isinstance(model, ExtendedFaceContact)
         problem, state = model.solved
-        table, samples, problem_with = model.table, self.parts.samples, self._problem
-        if model.wears:
-            areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
-            depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
-            nearest = table.nearest_levels(depth)
-            worn = [samples, *(level for _, level, _ in self.worn_samples)]
-            problem_with = partial(_worn_problem, self._problem, model.table, problem)
-            if nearest.any():
-                samples = tuple(worn[level][one] for one, level in enumerate(nearest))
-            table = table.at_levels(nearest)
         stiffness = step.interface_stiffness_N_per_mm or model.stiffness().interface
         known: dict[str, Any] = {
             "problem": problem,
             "face": model.face,
             "state": state,
-            "problem_with": problem_with,
-            "table": table,
-            "samples": samples,
+            "problem_with": self._problem,
+            "table": model.table,
+            "samples": self.parts.samples,
             "cells": self._cells,
             "step": replace(step, interface_stiffness_N_per_mm=stiffness),
             "new_laws": model.table.laws,
             "zero": self.parts.zero_error,
-            "coarser": self._worn_on_fewer if samples is not self.parts.samples else {},
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,
         }
-        probe = LawErrorProbe(**known)
+        if model.wears:
+            known |= self._as_worn(model)
         if self.scene.rubs_on_mesh:
             from patchlaw.multiscale.models.measured_errors.shear_of_samples import (
                 LawShearProbe,  # others do without
             )
 
             before = (model.slips_before or model.slips).with_ranks(model.face.comm)
-            probe = LawShearProbe(**known, before=before)
+            probe: LawErrorProbe = LawShearProbe(**known, before=before)
+        else:
+            probe = LawErrorProbe(**known)
         found = probe.measure()
         if model.wears:
-            known = {"points": model.worn_depth_between}
+            apart = {"points": model.worn_depth_between}
             if self.scene.rubs_on_mesh:
-                return error_columns(step, found.with_fretting(step, known))
-            zones, one_law = model.wear_by_zones, len(table.laws) == 1
-            of_wear = WearErrors(model.wear_errors, known, zones, one_law)
+                return error_columns(step, found.with_fretting(step, apart))
+            zones, one_law = model.wear_by_zones, len(model.table.laws) == 1
+            of_wear = WearErrors(model.wear_errors, apart, zones, one_law)
             found = found.with_wear(step, past, of_wear)
         return error_columns(step, found)
+
+    def _as_worn(self, model: ExtendedFaceContact) -> dict[str, Any]:
+        """Return laws, samples and problems of a worn face, by names that `LawErrorProbe` has."""
+        table, (problem, state) = model.table, model.solved
+        areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
+        nearest = table.nearest_levels(problem.sampling.patch_sums(state.sample_worn_depth) / areas)
+        found: dict[str, Any] = {
+            "problem_with": partial(_worn_problem, self._problem, table, problem),
+            "table": table.at_levels(nearest),
+        }
+        if nearest.any():
+            levels = [self.parts.samples, *(level for _, level, _ in self.worn_samples)]
+            samples = tuple(levels[level][one] for one, level in enumerate(nearest))
+            found |= {"samples": samples, "coarser": self._worn_on_fewer}
+        return found
 
     # --- laws and load steps
 
