@@ -16,9 +16,9 @@ from .loading.load_step import LoadStep as LoadStep
 from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
 from .models.face_contact import FaceContact as FaceContact
-from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
 from .models.problem import Problem as Problem
+from .models.reference_coupling import MeshedContact as MeshedContact
 from .models.reference_coupling import ReferenceCoupling as ReferenceCoupling
 from .models.setup import make_setup as make_setup
 from .results.accuracy import extrapolated as extrapolated

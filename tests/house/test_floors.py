@@ -74,7 +74,7 @@ UPPER = {
     "results": ["figures"],
     "models": [
         "problem",
-        "cell_contact patch_contact face_contact meshed_contact",
+        "cell_contact patch_contact face_contact",
         "reference_meshes",
         "validity",
         "coupling",
