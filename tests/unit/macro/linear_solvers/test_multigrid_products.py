@@ -1,4 +1,6 @@
-"""Matrices of coarser grids against dense Galerkin products."""
+"""Matrices of coarser grids against dense Galerkin products, and the blocks they are made from."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -7,7 +9,14 @@ from petsc4py import PETSc
 
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
-from patchlaw.macro.linear_solvers.multigrid import coarser_grids, lattice_of
+from patchlaw.macro.linear_solvers import multigrid
+from patchlaw.macro.linear_solvers.multigrid import (
+    block_rows,
+    coarser_grids,
+    galerkin,
+    lattice_of,
+    transfers,
+)
 from patchlaw.macro.linear_solvers.node_matrices import dofs_of, node_submatrix
 
 
@@ -42,18 +51,49 @@ def test_every_grid_has_the_galerkin_product(element, sides):
 
 def test_single_unknowns_may_be_held_anywhere():
     block = make()
+    step = next(transfers(lattice_of(block.space, block.mesh), block.free))
     free = block.free
     held = np.flatnonzero(free.array_r)[[5, 40, 41, -1]]  # also amid coarse nodes
     free.array[held] = 0.0
     matrix = block.stiffness.copy()
     matrix.zeroRowsColumns(held.astype(PETSc.IntType), 1.0)
-    grid = coarser_grids(lattice_of(block.space, block.mesh), matrix, free)[0]
-    weights, found = dense(grid.interpolation), dense(grid.matrix)
+    found = dense(galerkin(matrix, step.weights, free, step.coarse_free))
+    weights = np.kron(dense(step.weights), np.eye(3)) * free.array_r[:, None]
     expected = weights.T @ dense(matrix) @ weights
-    held = np.isclose(np.diag(found), 1.0, atol=0.0)
-    assert held.any()
-    assert (found[held].sum(axis=1) == 1.0).all()
+    stay = step.coarse_free.array_r > 0.0
+    expected[~stay], expected[:, ~stay] = 0.0, 0.0
+    expected[~stay, ~stay] = 1.0
     np.testing.assert_allclose(found, expected, atol=1e-13 * expected.max())
+
+
+def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
+    block = make()
+    step = next(transfers(lattice_of(block.space, block.mesh), block.free))
+    products = block.stiffness, step.weights, step.free, step.coarse_free
+    whole = dense(galerkin(*products))
+    monkeypatch.setattr(multigrid, "_NODES_AT_ONCE", 7)
+    pieces = dense(galerkin(*products))
+    np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
+
+
+def test_blocks_are_those_of_the_matrix():
+    matrix = make("roller").stiffness
+    with block_rows(matrix) as rows:
+        blocks = rows.own.data.reshape(-1, 3, 3).transpose(0, 2, 1).copy()
+        starts, columns = rows.own.indptr.copy(), rows.own.indices.copy()
+        assert rows.ghost.nnz == len(rows.ghosts) == 0
+    expected = dense(matrix)
+    found = np.zeros_like(expected)
+    for node, (first, last) in enumerate(pairwise(starts)):
+        for block, column in zip(blocks[first:last], columns[first:last], strict=True):
+            found[3 * node : 3 * node + 3, 3 * column : 3 * column + 3] = block
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_other_types_of_matrices_are_refused():
+    with pytest.raises(PETSc.Error):
+        with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
+            pass
 
 
 def test_parts_are_those_of_the_matrix():
