@@ -18,23 +18,22 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-import mutated_scenes  # noqa: E402
-import result_folders  # noqa: E402
-import shell_lines  # noqa: E402
-from helpers import (  # noqa: E402
+from helpers import mesh_files, wrong_arguments  # noqa: E402
+
+from benchmarks import (  # noqa: E402
     command_words,
     compared_inputs,
     height_files,
     map_round_trips,
-    mesh_files,
     misspellings,
+    mutated_scenes,
+    result_folders,
     scene_inputs,
+    shell_lines,
     stored_inputs,
-    wrong_arguments,
 )
-
 from patchlaw.geometry.meshes.gmsh_file import read_gmsh_file  # noqa: E402
 
 LONGEST = 30  # seconds of the processor for one input

@@ -4,8 +4,9 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from helpers.scene_inputs import BASE, KEYS, put, toml, value
 from hypothesis import strategies as st
+
+from benchmarks.scene_inputs import BASE, KEYS, put, toml, value
 
 STORED = sorted((Path(__file__).parents[1] / "demos" / "scenes").glob("*.toml"))
 SMALL = {

@@ -31,7 +31,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from dolfinx import fem
 from helpers.body_meshes import HIGH, LOW, box
-from helpers.plane_problems import at, mixed_space, rectangle, strain_of
+from helpers.faces import at
+from helpers.plane_problems import mixed_space, rectangle, strain_of
 from helpers.user_problems import clamped, elastic
 from json_rows import keep
 

@@ -31,9 +31,13 @@ TIMEOUT = 60
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _OTHERS_ENTER = stat.S_IXGRP | stat.S_IXOTH
 _ROOT = 0
+_TICK = 2.0
+"""Seconds within which files may come to a folder and leave its time as it is."""
 _SUM = ".sha256"
 _checked: set[tuple[str, int, int]] = set()
 """Compiled forms that this process has checked: names, times and sizes."""
+_unchanged: dict[Path, int | None] = {}
+"""Folders that nobody else can enter, and when files last came into them, or went, as checked."""
 
 
 def user_cache() -> Path:
@@ -134,6 +138,8 @@ def _check(folder: Path) -> None:
             allowed=f"chmod 700 {folder}, or XDG_CACHE_HOME in a folder of your own",
         )
     hidden = not facts.st_mode & _OTHERS_ENTER
+    if hidden and _unchanged.get(folder) == facts.st_mtime_ns:
+        return  # looking at each of thousands of forms took longer than to load one
     entries: list[os.DirEntry[str]] = []
     with suppress(PermissionError):
         entries = list(os.scandir(folder))
@@ -151,6 +157,8 @@ def _check(folder: Path) -> None:
                 _remove(form)
             else:
                 _checked.add(identity)
+    settled = time.time() - facts.st_mtime > _TICK  # what comes at once has the same time
+    _unchanged[folder] = facts.st_mtime_ns if settled else None
 
 
 def _is_own(facts: os.stat_result) -> bool:

@@ -23,7 +23,7 @@ with suppress(PackageNotFoundError):  # MPI as a wheel is found by dolfinx once 
     import mpi4py.MPI  # noqa: F401
 import numpy as np
 from helpers.mpi_environment import BESIDE_OTHERS
-from helpers.waiting_ranks import WaitingRanks
+from helpers.waiting_ranks import WaitingRanks, alone
 
 # as in a terminal, also where the tests are started in the background or by nohup
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -178,10 +178,12 @@ def mpirun(root):
 
 @pytest.fixture(scope="session")
 def waiting_ranks(root, tmp_path_factory):
-    """Return what `mpirun` returns, but from ranks that wait for the next command."""
+    """Return what `mpirun` returns, but from ranks that wait for the next command, or this one."""
     started = {}
 
     def run(ranks, *words, timeout=240):
+        if ranks == 1:
+            return alone(list(map(str, words)))
         if ranks not in started or not started[ranks].are_waiting:
             folder = tmp_path_factory.mktemp(f"{ranks}_ranks")
             started[ranks] = WaitingRanks(ranks, root, folder)

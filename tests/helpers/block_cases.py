@@ -16,10 +16,12 @@ def uneven_laws(count, k=3e4):
     return [PowerLaw(k * random.uniform(0.2, 2.0), random.uniform(0.0, 6e-3)) for _ in range(count)]
 
 
-def block_of(sides="free", young_modulus=4000.0, poisson_ratio=0.15, comm=MPI.COMM_SELF, **shape):
+def block_of(sides="free", young_modulus=4000.0, poisson_ratio=0.15, comm=MPI.COMM_SELF,
+             density=None, **shape):  # fmt: skip
     """Mesh a block; the paper's material unless told otherwise."""
     shape = {"interface": (1.0, 1.0), "height": 1.0, "cells": (6, 6, 4)} | shape
-    material = Material(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
+    constants = {"young_modulus": young_modulus, "poisson_ratio": poisson_ratio}
+    material = Material(**constants, density=density)
     return Block(block_mesh(BlockShape(**shape), comm), material, sides=sides)
 
 

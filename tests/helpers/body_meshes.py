@@ -4,6 +4,7 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
+from helpers.faces import at, tagged
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
 
@@ -17,15 +18,9 @@ def box(lower, upper, cells, cell="hexahedron", comm=MPI.COMM_SELF):
     mesh = dmesh.create_box(
         comm, [np.array(lower, float), np.array(upper, float)], cells, CELLS[cell]
     )
-    found = [
-        dmesh.locate_entities_boundary(mesh, 2, lambda x, k=k, at=at: np.isclose(x[k], at))
-        for k, at in ((2, lower[2]), (2, upper[2]), (0, lower[0]))
-    ]
-    facets = np.concatenate(found).astype(np.int32)
-    markers = np.repeat([LOW, HIGH, SIDE], [len(part) for part in found]).astype(np.int32)
-    order = np.argsort(facets)
-    tags = dmesh.meshtags(mesh, 2, facets[order], markers[order])
-    return TaggedMesh(mesh=mesh, facet_tags=tags, facet_names={"low": LOW, "high": HIGH})
+    faces = {LOW: at(mesh, 2, lower[2]), HIGH: at(mesh, 2, upper[2]), SIDE: at(mesh, 0, lower[0])}
+    names = {"low": LOW, "high": HIGH}
+    return TaggedMesh(mesh=mesh, facet_tags=tagged(mesh, faces), facet_names=names)
 
 
 def standing(mesh, material, patches, order=1, **loads):

@@ -9,6 +9,8 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from helpers.faces import at
+
 YOUNG, POISSON = 4000.0, 0.3
 LAME = YOUNG * POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
 SHEAR = YOUNG / (2.0 * (1.0 + POISSON))
@@ -21,14 +23,6 @@ def rectangle(lower, upper, cells, cell="quadrilateral", comm=MPI.COMM_SELF):
     corners = [np.array(lower, float), np.array(upper, float)]
     make = dmesh.create_rectangle if len(cells) == 2 else dmesh.create_box
     return make(comm, corners, list(cells), getattr(dmesh.CellType, cell))
-
-
-def at(mesh, axis, value):
-    """The outer facets on a plane across an axis."""
-    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    return dmesh.locate_entities_boundary(
-        mesh, mesh.topology.dim - 1, lambda x: np.isclose(x[axis], value)
-    )
 
 
 def rollers(space, *planes):

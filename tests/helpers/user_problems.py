@@ -10,8 +10,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from helpers.contact_laws import PowerLaw, RangedLaw  # noqa: F401
+from helpers.faces import at, tagged
 from patchlaw.geometry import PatchGrid
-from patchlaw.macro import TaggedMesh, compat
+from patchlaw.macro import ContactProblem, Interface, TaggedMesh, compat
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
 TOP, BOTTOM = 7, 3
@@ -29,18 +30,13 @@ def box(cells=(4, 4, 3), cell=TETRAHEDRA, comm=MPI.COMM_SELF, lengths=(1.0, 1.0,
 
 def marked(mesh, lengths=(1.0, 1.0, 1.0)):
     """Facet tags of top and bottom; call it before the mesh is turned."""
-    top = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
-    bottom = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], -lengths[2]))
-    facets = np.concatenate([top, bottom])
-    values = np.repeat(np.array([TOP, BOTTOM], np.int32), [len(top), len(bottom)])
-    order = np.argsort(facets)
-    return dmesh.meshtags(mesh, 2, facets[order], values[order])
+    return tagged(mesh, {TOP: at(mesh, 2, 0.0), BOTTOM: at(mesh, 2, -lengths[2])})
 
 
 def clamped(space, tags, value=(0.0, 0.0, 0.0), tag=BOTTOM):
-    """All displacements of a face prescribed."""
+    """All displacements of a face prescribed; without tags, of the facets given for it."""
     space.mesh.topology.create_connectivity(2, 3)
-    nodes = fem.locate_dofs_topological(space, 2, tags.find(tag))
+    nodes = fem.locate_dofs_topological(space, 2, tag if tags is None else tags.find(tag))
     return fem.dirichletbc(np.array(value, dtype=PETSc.ScalarType), nodes, space)
 
 
@@ -55,6 +51,31 @@ def elastic(displacement, young=4000.0, poisson=0.15, degree=None, thermal=0.0):
     degree = 2 * compat.lagrange_degree(space) if degree is None else degree
     dx = ufl.Measure("dx", domain=space.mesh, metadata={"quadrature_degree": degree})
     return ufl.inner(stress, ufl.sym(ufl.grad(test))) * dx
+
+
+def pressed_face(space, tags, tag=TOP, *, work=None, held=None, solver=None, **face):
+    """An interface on a face of an elastic body, clamped at its bottom, and the problem of both.
+
+    Args:
+        space: Of the displacements.
+        tags: Of the mesh's facets.
+        tag: Of the face.
+        work: The body's virtual work, by its displacement.
+        held: Conditions in place of the clamp.
+        solver: Further arguments of `ContactProblem`.
+        face: Those of `Interface`.
+    """
+    u = fem.Function(space)
+    rough = Interface(space, tags, tag, **face)
+    held = [clamped(space, tags)] if held is None else held
+    return rough, ContactProblem((work or elastic)(u), u, held, rough, **(solver or {}))
+
+
+def pressed_box(*, cells=(4, 4, 3), cell=TETRAHEDRA, degree=1, comm=MPI.COMM_SELF,
+                lengths=(1.0, 1.0, 1.0), **given):  # fmt: skip
+    """The top of a box as an interface, and its problem; see `box` and `pressed_face`."""
+    mesh = box(cells, cell, comm, lengths)
+    return pressed_face(compat.vector_space(mesh, degree), marked(mesh, lengths), **given)
 
 
 LOW, HIGH, DISC, PAD = 1, 2, 3, 4
@@ -87,14 +108,7 @@ def stacked(disc=(6, 4, 2), pad=(3, 2, 2), comm=MPI.COMM_SELF):
         cells, points = cells[:0], points[:0]
     mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, comm)
     heights = {LOW: 0.0, DISC: DISC_HEIGHT, PAD: base, HIGH: base + PAD_HEIGHT}
-    found = {
-        tag: dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.abs(x[2] - z) < 1e-6)
-        for tag, z in heights.items()
-    }
-    facets = np.concatenate(list(found.values()))
-    values = np.repeat(np.array(list(found), np.int32), list(map(len, found.values())))
-    order = np.argsort(facets)
-    return mesh, dmesh.meshtags(mesh, 2, facets[order], values[order])
+    return mesh, tagged(mesh, {tag: at(mesh, 2, z) for tag, z in heights.items()})
 
 
 def pad_and_disc(comm, cell=HEXAHEDRA, disc=(6, 4, 2), pad=(3, 2, 2)):
@@ -106,14 +120,8 @@ def pad_and_disc(comm, cell=HEXAHEDRA, disc=(6, 4, 2), pad=(3, 2, 2)):
     ):
         ends = [[0.0, 0.0, below], [*SIDES, below + height]]
         mesh = dmesh.create_box(comm, ends, list(cells), cell)
-        facets = [
-            dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.abs(x[2] - z) < 1e-6)
-            for z in (below, below + height)
-        ]
-        values = np.repeat(np.array([low, high], np.int32), list(map(len, facets)))
-        order = np.argsort(np.concatenate(facets))
-        tags = dmesh.meshtags(mesh, 2, np.concatenate(facets)[order], values[order])
-        found[name] = TaggedMesh(mesh=mesh, facet_tags=tags)
+        faces = {low: at(mesh, 2, below), high: at(mesh, 2, below + height)}
+        found[name] = TaggedMesh(mesh=mesh, facet_tags=tagged(mesh, faces))
     return found
 
 

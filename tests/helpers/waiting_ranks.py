@@ -15,7 +15,8 @@ import subprocess
 import sys
 import time
 import traceback
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 from .mpi_environment import BESIDE_OTHERS
@@ -97,6 +98,15 @@ class WaitingRanks:
             os.close(pipe)
         self._pipes = []
         self._process.wait(timeout=60)
+
+
+def alone(words):
+    """Return what a command prints on one rank, this process itself, and the code it ends with."""
+    path, argv, printed = list(sys.path), sys.argv, (StringIO(), StringIO())
+    with redirect_stdout(printed[0]), redirect_stderr(printed[1]):
+        code = _ended_with(words)
+    sys.path[:], sys.argv = path, argv
+    return subprocess.CompletedProcess(words, code, *(text.getvalue() for text in printed))
 
 
 @contextmanager

@@ -3,13 +3,13 @@
 import csv
 import re
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 from statistics import median
 
 import pytest
 from helpers.picture_answers import still_found
+from helpers.waiting_ranks import alone
 
 ROOT = Path(__file__).parents[2]
 DATA, BENCHMARKS = ROOT / "demos" / "data", ROOT / "benchmarks"
@@ -54,8 +54,9 @@ rounded, percent = PUBLISHED["rounded"], PUBLISHED["percent"]
 
 def drawn_again(demo, folder):
     """Return the lines that a demo prints of its stored data."""
-    words = [sys.executable, f"demos/{demo}.py", "--data", DATA / f"{demo}.csv", "--out", folder]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    words = ROOT / f"demos/{demo}.py", "--data", DATA / f"{demo}.csv", "--out", folder
+    done = alone(list(map(str, words)))
+    assert done.returncode == 0, done.stderr
     still_found(folder / f"{demo}.png")
     return done.stdout.splitlines()
 

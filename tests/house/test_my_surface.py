@@ -6,10 +6,12 @@ import shlex
 import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.waiting_ranks import alone
 
 from patchlaw.multiscale import read_history
 
@@ -41,8 +43,8 @@ def said(place):
 
 
 def said_by(command, place):
-    words = [sys.executable, "-m", "patchlaw", *shlex.split(command, comments=True)]
-    done = subprocess.run(words, cwd=place, capture_output=True, text=True, check=False)
+    with chdir(place):
+        done = alone(["-m", "patchlaw", *shlex.split(command, comments=True)])
     return " ".join((done.stdout + done.stderr).split()), done.returncode
 
 

@@ -9,6 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from helpers.waiting_ranks import alone
 from PIL import Image
 from setuptools import find_packages
 
@@ -37,9 +38,7 @@ FEATURES = (DOCS / "features.md").read_text(encoding="utf-8")
 def test_composed_example():
     example = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)[0]
     (shown,) = re.findall(r"It ends with `(.*?)`", TEXT)
-    done = subprocess.run(
-        [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = alone(["-c", example])
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == shown
 
@@ -48,9 +47,7 @@ def test_composed_example():
 def test_example_of_a_run():
     (example,) = re.findall(r"```python\n(.*?)```", FEATURES, re.DOTALL)
     (shown,) = re.findall(r"```none\n(.*?)```", FEATURES, re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = alone(["-c", example])
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == shown.splitlines()
 

@@ -38,6 +38,8 @@ def test_scripts_run_by_hand_name_what_there_is(folder):
     texts = {file: file.read_text("utf-8") for file in (ROOT / folder).glob("*.py")}
     scripts = "".join(texts.values())  # mypy follows what they take from each other by package
     others = {*re.findall(r"from benchmarks\.(\w+) import", scripts), "half_space_peers"}
+    together = re.findall(r"from benchmarks import \(([^)]*)\)", scripts)
+    others |= {name for names in together for name in re.findall(r"\w+", names)}
     others |= {file.stem for file, text in texts.items() if "from ContactMechanics import" in text}
     files = [str(file) for file in texts if file.stem not in others]
     result = (

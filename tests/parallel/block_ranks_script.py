@@ -1,16 +1,10 @@
 """Run all cases on all ranks and print what rank 0 found as JSON; for test_block_ranks.py."""
 
-import json
-import sys
-from pathlib import Path
-
 import numpy as np
-from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from helpers.block_cases import block_of, interface_of, uneven_laws
 from helpers.contact_laws import PowerLaw
+from helpers.on_ranks import tell
+from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, RefinedShape
 from patchlaw.geometry.face_frame import UPWARD
@@ -151,5 +145,4 @@ if __name__ == "__main__":
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "meshing": fail_in_meshing()}
     result |= {"tractions": tractions_on_mesh()}
-    if COMM.rank == 0:
-        print(json.dumps(result))
+    tell(result)

@@ -1,11 +1,10 @@
 """Make a block's compliance in modes on all ranks, print it as JSON; for test_body_ranks.py."""
 
-import json
-import sys
 from functools import partial
 from unittest import mock
 
 import numpy as np
+from helpers.on_ranks import tell
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
@@ -58,5 +57,4 @@ if __name__ == "__main__":
     assert all((on_lattice == other).all() for other in COMM.allgather(on_lattice))
     result["patches"] = on_lattice.tolist()
     errors = failed()
-    if COMM.rank == 0:
-        sys.stdout.write(json.dumps({"values": result, "errors": errors}) + "\n")
+    tell({"values": result, "errors": errors})

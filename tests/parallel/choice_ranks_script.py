@@ -4,16 +4,13 @@ A block, and a plate from a file under laws of samples, which is refined.
 """
 
 import json
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from helpers.box_msh import write_box
+from helpers.on_ranks import tell
+from mpi4py import MPI
 
 from patchlaw.multiscale import Run, Scene
 
@@ -57,5 +54,4 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         mesh = Path(COMM.bcast(folder)) / "plate.msh"
         everywhere = COMM.gather({"block": on_block(), "plate": on_plate(mesh)})
-    if COMM.rank == 0:
-        print(json.dumps(everywhere, sort_keys=True))
+    tell(everywhere)

@@ -1,12 +1,7 @@
 """Forces of blocks and bodies by the solvers that PETSc's options choose; for the test beside."""
 
-import json
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from helpers.contact_laws import PowerLaw
+from helpers.on_ranks import tell
 from helpers.user_problems import BOTTOM, HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, box, marked
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -87,5 +82,4 @@ def by_choice(choice):
 if __name__ == "__main__":
     taken = ("usual", "mumps") if COMM.size == 1 else CHOICES.keys() - {"usual"}
     result = {choice: by_choice(choice) for choice in sorted(taken)}
-    if COMM.rank == 0:
-        sys.stdout.write(json.dumps(result) + "\n")
+    tell(result)

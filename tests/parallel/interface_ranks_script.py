@@ -1,21 +1,15 @@
 """A user's problems with rough interfaces on all ranks, printed as JSON; for the test beside."""
 
-import json
-import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
-from mpi4py import MPI
-from petsc4py import PETSc
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
+from helpers.block_cases import block_of
 from helpers.contact_laws import PowerLaw, RangedLaw
-from helpers.plane_problems import at, inner_work, mixed_space, rectangle, rollers, two_rectangles
+from helpers.faces import at
+from helpers.on_ranks import tell
+from helpers.plane_problems import inner_work, mixed_space, rectangle, rollers, two_rectangles
 from helpers.user_problems import (
     DISC,
     HEXAHEDRA,
@@ -25,25 +19,24 @@ from helpers.user_problems import (
     PAD,
     PATCHES,
     TETRAHEDRA,
-    TOP,
     box,
     clamped,
     elastic,
     marked,
     pad_and_disc,
+    pressed_box,
+    pressed_face,
     stacked,
     work,
 )
+from mpi4py import MPI
 
-from patchlaw.geometry import BlockShape, Control, Friction, PatchGrid, RigidPlane, ShearControl
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.macro import (
-    Block,
     ContactProblem,
     Interface,
     LawContactProblem,
     LoadedFace,
-    Material,
-    block_mesh,
     compat,
     joined_meshes,
 )
@@ -58,17 +51,16 @@ CONTROLS = {
 
 def cube(element, mode):
     """Return the forces of a block, and their differences to those of the same as user code."""
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3), element=element)
-    block = Block(block_mesh(shape, COMM), Material(young_modulus=4000.0, poisson_ratio=0.15))
+    block, found = block_of(cells=(4, 4, 3), element=element, comm=COMM), {}
     problem = LawContactProblem(LoadedFace.of_block(block, PATCHES), LAWS, mode)
     space = compat.vector_space(block.mesh.mesh, int(element[1]))
-    nodes = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -1.0))
-    support = fem.dirichletbc(np.zeros(3, PETSc.ScalarType), nodes, space)
-    u, found = fem.Function(space), {}
     for name, control in CONTROLS.items():
-        options = {"patches": PATCHES, "mode": mode, "indenter": control}
-        rough = Interface(space, block.mesh.facet_tags, 2, laws=LAWS, **options)
-        ContactProblem(elastic(u, degree=block.quadrature_degree), u, [support], rough).solve()
+        rough, own = pressed_face(
+            space, block.mesh.facet_tags, 2, laws=LAWS, patches=PATCHES, mode=mode,
+            indenter=control, held=[clamped(space, block.mesh.facet_tags, tag=1)],
+            work=lambda u: elastic(u, degree=block.quadrature_degree),
+        )  # fmt: skip
+        own.solve()
         state = problem.solve(control)
         found[f"{element} {mode} {name}"] = [
             rough.force,
@@ -80,14 +72,13 @@ def cube(element, mode):
 
 def bar():
     """A long bar: contact at one end, where most ranks have no facets; in the matrix or not."""
-    lengths, found = (0.5, 0.5, 4.0), {}
-    mesh = box(cells=(2, 2, 24), cell=HEXAHEDRA, comm=COMM, lengths=lengths)
-    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 1)
+    long, found = {"cells": (2, 2, 24), "cell": HEXAHEDRA, "lengths": (0.5, 0.5, 4.0)}, {}
     for in_matrix in (False, True):
-        u = fem.Function(space)
-        rough = Interface(space, tags, TOP, laws=LAWS[0], indenter=RigidPlane(approach=2e-2))
+        rough, problem = pressed_box(
+            **long, comm=COMM, laws=LAWS[0], indenter=RigidPlane(approach=2e-2),
+            solver={"in_matrix": in_matrix},
+        )  # fmt: skip
         given = len(rough.sampling.weight)
-        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough, in_matrix=in_matrix)
         problem.solve()
         found[f"bar {in_matrix}"] = [rough.force, problem.reaction()[2] / rough.force - 1.0]
     return found, COMM.allgather(given)
@@ -98,13 +89,13 @@ def rubbing():
     found, laws = {}, [RangedLaw(law.k, law.touch) for law in LAWS]
     shears = [ShearControl(shift=(6e-4, 2e-4)), ShearControl(force=(-0.2, 0.3))]
     for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
-        mesh = box(cell=cell, comm=COMM)
-        tags, space = marked(mesh), compat.vector_space(mesh, 1)
-        u, friction = fem.Function(space), Friction(coefficient=0.3, poisson_ratio=0.2)
-        options = {"patches": PATCHES, "mode": mode, "friction": friction}
-        force = Control(force=3.0, tilt=None)
-        rough = Interface(space, tags, TOP, laws=laws, indenter=force, **options)
-        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        force, friction = (
+            Control(force=3.0, tilt=None),
+            Friction(coefficient=0.3, poisson_ratio=0.2),
+        )
+        options = {"cell": cell, "comm": COMM, "patches": PATCHES, "mode": mode}
+        options |= {"laws": laws, "indenter": force, "friction": friction}
+        rough, problem = pressed_box(**options)
         for k, shear in enumerate((None, *shears)):
             rough.indenter = replace(force, shear=shear)
             problem.solve()
@@ -112,8 +103,7 @@ def rubbing():
                 rough.slip_record = rough.slip_record  # as from another run
             values = [*rough.shear_force, rough.dissipated, rough.slip_area, *rough.shift]
             found[f"{mode} {k}"] = [float(value) for value in values]
-    rough = Interface(space, tags, TOP, laws=laws, indenter=force, wear=0.1, **options)
-    problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+    rough, problem = pressed_box(wear=0.1, **options)
     problem.solve()
     rough.indenter = replace(force, shear=ShearControl(shift=(4e-3, 1e-3)))
     problem.solve()
@@ -127,13 +117,10 @@ def wearing():
     """Return what faces wear, patchwise and at points, going on from a record half-way."""
     found = {}
     for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
-        mesh = box(cell=cell, comm=COMM)
-        tags, space = marked(mesh), compat.vector_space(mesh, 1)
-        u, force = fem.Function(space), Control(force=3.0, tilt=None)
-        rough = Interface(
-            space, tags, TOP, laws=LAWS, patches=PATCHES, mode=mode, indenter=force, wear=1e-6
-        )
-        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        rough, problem = pressed_box(
+            cell=cell, comm=COMM, laws=LAWS, patches=PATCHES, mode=mode, wear=1e-6,
+            indenter=Control(force=3.0, tilt=None),
+        )  # fmt: skip
         for distance in (50.0, 400.0):
             report = problem.slide(distance)
             rough.wear_record = rough.wear_record  # as from another run
@@ -156,13 +143,11 @@ def opposite(*, joined=False):
         mesh, tags = whole.mesh, whole.facet_tags
         low, high, disc, pad = map(whole.facet_tag, ("disc 1", "pad 2", "disc 3", "pad 4"))
     space = compat.vector_space(mesh, 1)
-    u = fem.Function(space)
-    held = [clamped(space, tags, tag=low), clamped(space, tags, (1e-3, 0.0, -9e-3), tag=high)]
-    rough = Interface(
+    rough, problem = pressed_face(
         space, tags, disc, opposite=pad, laws=RangedLaw(3e4, end=1.0),
-        friction=Friction(coefficient=0.3, poisson_ratio=0.2),
+        friction=Friction(coefficient=0.3, poisson_ratio=0.2), work=lambda u: work(u, 0.3),
+        held=[clamped(space, tags, tag=low), clamped(space, tags, (1e-3, 0.0, -9e-3), tag=high)],
     )  # fmt: skip
-    problem = ContactProblem(work(u, 0.3), u, held, rough)
     problem.solve()
     sizes = [compat.petsc_vector(one).norm() for one in rough.fields().values()]
     return [rough.force, *rough.shear_force, *sizes], problem.reaction().tolist()
@@ -196,16 +181,12 @@ def leak():
     for cell in (TETRAHEDRA, HEXAHEDRA):
         mesh = box(cells=(6, 5, 3), cell=cell, comm=COMM)
         tags, space = marked(mesh), compat.vector_space(mesh, 1)
-        left, right = (
-            dmesh.locate_entities_boundary(mesh, 2, lambda x, at=at: np.isclose(x[0], at))
-            for at in (0.0, 1.0)
-        )
+        left, right = at(mesh, 0, 0.0), at(mesh, 0, 1.0)
         for laws in (LeakingLaw(3e4), [LeakingLaw(k) for k in (3e4, 1e4, 5e4, 2e4)]):
-            u = fem.Function(space)
             patches = PATCHES if isinstance(laws, list) else None
             plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
-            rough = Interface(space, tags, TOP, laws=laws, patches=patches, indenter=plane)
-            ContactProblem(elastic(u), u, [clamped(space, tags)], rough).solve()
+            rough, own = pressed_face(space, tags, laws=laws, patches=patches, indenter=plane)
+            own.solve()
             water = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}
             flow = rough.leak(left, right, **water)
             turned = [
@@ -271,8 +252,6 @@ if __name__ == "__main__":
     errors, leaks = refusals(), leak()
     rubbed, pair, planes, worn = rubbing(), opposite(), plane(), wearing()
     joined = opposite(joined=True)
-    if COMM.rank == 0:
-        values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
-        values |= {"rubbed": rubbed, "opposite": pair, "plane": planes, "worn": worn}
-        values["joined"] = joined
-        sys.stdout.write(json.dumps(values) + "\n")
+    found = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
+    found |= {"rubbed": rubbed, "opposite": pair, "plane": planes, "worn": worn, "joined": joined}
+    tell(found)

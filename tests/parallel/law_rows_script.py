@@ -4,9 +4,9 @@ Those at the larger approach are shared by the ranks; those at the smaller one a
 """
 
 import hashlib
-import json
 from dataclasses import replace
 
+from helpers.on_ranks import tell
 from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
@@ -63,8 +63,7 @@ def main():
     table = representative_laws(regions, 4000.0, largest_pressure=1500.0, comm=COMM)
     representative = hashlib.sha256(law_bytes(table)).hexdigest()
     found = COMM.gather((*solved, *hashes, representative))
-    if COMM.rank == 0:
-        print(json.dumps(found))
+    tell(found)
 
 
 main()

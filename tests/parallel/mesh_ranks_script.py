@@ -1,16 +1,11 @@
 """Make blocks on all ranks and print facts as JSON; for test_mesh_ranks.py."""
 
 import hashlib
-import json
-import sys
-from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from helpers.mesh_facts import cells_of, faces_of, measures_of
+from helpers.on_ranks import tell
+from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, RoughFace, block_mesh, compat
@@ -77,5 +72,4 @@ if __name__ == "__main__":
     shares = np.random.default_rng(5).random((12, 9, 8))
     patterns = shares < np.linspace(0.05, 0.7, 12)[:, None, None]
     result["regions"] = {"found": regions(patterns), "patterns": patterns.astype(int).tolist()}
-    if COMM.rank == 0:
-        print(json.dumps(result))
+    tell(result)

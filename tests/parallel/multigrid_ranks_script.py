@@ -1,14 +1,9 @@
 """Solve blocks on all ranks and print iterations and norms as JSON; for test_multigrid_ranks.py."""
 
-import json
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from helpers.on_ranks import tell
 from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.machine_parts import Part, part_body, read_part
 from patchlaw.geometry import BlockShape, RefinedShape
@@ -97,5 +92,4 @@ if __name__ == "__main__":
         patch.setattr(selection, "has_hypre", lambda: False)
         part, options = PARTS["part, flat"]
         result["part, without hypre"] = solved(part_body(read_part(Part(**part), COMM), **options))
-    if COMM.rank == 0:
-        print(json.dumps(result))
+    tell(result)

@@ -1,18 +1,14 @@
 """Press two meshed bodies on each other on all ranks, print as JSON; for test_pair_ranks.py."""
 
-import json
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+from helpers.body_meshes import SIDE, box, hanging, standing
+from helpers.contact_laws import PowerLaw
+from helpers.on_ranks import tell
 from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import FacePair, LawContactProblem, Material, Support
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from helpers.body_meshes import SIDE, box, hanging, standing
-from helpers.contact_laws import PowerLaw
 
 COMM = MPI.COMM_WORLD
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -47,5 +43,4 @@ if __name__ == "__main__":
         f"{mode} {order} {holds_edge}": pressed(mode, order, holds_edge)
         for mode, order, holds_edge in (("patchwise", 1, False), ("pointwise", 2, True))
     }
-    if COMM.rank == 0:
-        sys.stdout.write(json.dumps(result) + "\n")
+    tell(result)

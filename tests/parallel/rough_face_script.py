@@ -1,13 +1,8 @@
 """Press a foot that is meshed with its roughness; rank 0 prints the results as JSON."""
 
-import json
-import sys
-from pathlib import Path
-
 import numpy as np
+from helpers.on_ranks import tell
 from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.l_shape import LENGTHS, SPECTRUM, Reference
 from patchlaw.geometry import Spectrum, synthesise
@@ -35,8 +30,7 @@ def main():
         "top_nodes_of_ranks": COMM.allgather(len(problem.top.dofs)),
         "largest": COMM.allreduce(float(np.abs(states[-1].displacement).max()), op=MPI.MAX),
     }
-    if COMM.rank == 0:
-        print(json.dumps(found))
+    tell(found)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,7 @@
 """Press rough blocks on all ranks and print what was found as JSON; for test_rough_ranks.py."""
 
-import json
-
 import numpy as np
+from helpers.on_ranks import tell
 from mpi4py import MPI
 
 from patchlaw import InputError
@@ -103,5 +102,4 @@ def fail_too_steep():
 if __name__ == "__main__":
     result = {name: run(*case) for name, case in CASES.items()}
     result["too steep"] = fail_too_steep()
-    if COMM.rank == 0:
-        print(json.dumps(result))
+    tell(result)

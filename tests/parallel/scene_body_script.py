@@ -1,10 +1,10 @@
 """Forces of scenes on bodies from meshes, printed by rank 0; run under mpirun with a folder."""
 
 import cmath
-import json
 import sys
 from pathlib import Path
 
+from helpers.on_ranks import tell
 from mpi4py import MPI
 
 from patchlaw.multiscale import Run, Scene
@@ -102,8 +102,7 @@ def main(folder):
             found[name] += abs(shear), cmath.phase(shear), last.dissipated_mJ
             found[name] += tuple(abs(shear) + error for _, error in last.shear_errors)
         run.close()
-    if comm.rank == 0:
-        print(json.dumps(found))
+    tell(found)
 
 
 main(Path(sys.argv[1]))

@@ -1,7 +1,5 @@
 """Read meshes on all ranks, check them, and print facts as JSON; for test_tagged_ranks.py."""
 
-import json
-import sys
 import tempfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,11 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from helpers.mesh_files import tagged_box, write_boxes, write_msh2
+from helpers.on_ranks import tell
+from mpi4py import MPI
 
 from patchlaw.macro import TaggedMesh, compat, planar_face, read_mesh, write_mesh
 from patchlaw.macro.mesh.facets import parts
@@ -139,5 +135,4 @@ if __name__ == "__main__":
         found["errors"] = errors(folder)
         found["pushed"] = pushed()
         COMM.barrier()
-    if COMM.rank == 0:
-        print(json.dumps(found))
+    tell(found)

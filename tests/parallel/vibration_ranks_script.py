@@ -1,19 +1,15 @@
 """Natural modes of a block under laws on all ranks, printed as JSON; for the test beside."""
 
-import json
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from dolfinx import fem
+from helpers.on_ranks import tell
+from helpers.user_problems import PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 from mpi4py import MPI
 from scipy.io import mmread
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from helpers.user_problems import PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 
 from patchlaw.geometry import BlockShape, Control, RigidPlane
 from patchlaw.macro import (
@@ -96,5 +92,4 @@ def springs():
 if __name__ == "__main__":
     result = {name: modes(*case) for name, case in CASES.items()}
     result["springs"] = springs()
-    if COMM.rank == 0:
-        sys.stdout.write(json.dumps(result) + "\n")
+    tell(result)

@@ -5,19 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
 from helpers.contact_laws import PowerLaw, RangedLaw
-from helpers.user_problems import HEXAHEDRA, TETRAHEDRA, box, elastic
+from helpers.faces import at, tagged
+from helpers.user_problems import HEXAHEDRA, TETRAHEDRA, box, elastic, pressed_face
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import (
-    ContactProblem,
     FacePair,
-    Interface,
     LawContactProblem,
     LoadedFace,
     Material,
@@ -108,13 +106,7 @@ contact = "none"
 def marked(mesh):
     """Facet tags of all six faces."""
     sides = [(2, 0.0), (2, -LENGTHS[2]), (0, 0.0), (0, LENGTHS[0]), (1, 0.0), (1, LENGTHS[1])]
-    found = [
-        dmesh.locate_entities_boundary(mesh, 2, lambda x, a=axis, at=at: np.isclose(x[a], at))
-        for axis, at in sides
-    ]
-    facets, values = np.concatenate(found), np.repeat(np.arange(1, 7), [len(f) for f in found])
-    order = np.argsort(facets)
-    return dmesh.meshtags(mesh, 2, facets[order], values[order].astype(np.int32))
+    return tagged(mesh, {tag: at(mesh, *side) for tag, side in enumerate(sides, 1)})
 
 
 def face_of(case, mesh, tags, order=1):
@@ -127,8 +119,7 @@ def face_of(case, mesh, tags, order=1):
 def own_problem(case, mesh, tags, mode, order):
     """The same problem, as a user writes it."""
     space = compat.vector_space(mesh, order)
-    u, conditions = fem.Function(space), []
-    mesh.topology.create_connectivity(2, 3)
+    conditions = []
     for tag, held in case.supports.items():
         nodes = fem.locate_dofs_topological(space, 2, tags.find(tag))
         conditions += [
@@ -136,11 +127,10 @@ def own_problem(case, mesh, tags, mode, order):
             for axis, value in enumerate(held)
             if value is not None
         ]
-    rough = Interface(
-        space, tags, TOP, laws=LAWS, patches=PATCHES, mode=mode,
-        indenter=case.steps[0], friction=friction_of(case),
+    return pressed_face(
+        space, tags, TOP, laws=LAWS, patches=PATCHES, mode=mode, held=conditions,
+        indenter=case.steps[0], friction=friction_of(case), work=lambda u: elastic(u, YOUNG, NU),
     )  # fmt: skip
-    return rough, ContactProblem(elastic(u, YOUNG, NU), u, conditions, rough)
 
 
 def friction_of(case):
@@ -198,8 +188,8 @@ def test_two_bodies_held_at_the_edge_are_one_on_softer_laws(mode):
     tags = marked(other)
     other.geometry.x[:, 2] *= -1.0
     supports = [Support(tag=WEST)]
-    tagged = TaggedMesh(mesh=other, facet_tags=tags)
-    body = MeshedBody(tagged, MATERIAL, supports, normal=(0, 0, -1))
+    whole = TaggedMesh(mesh=other, facet_tags=tags)
+    body = MeshedBody(whole, MATERIAL, supports, normal=(0, 0, -1))
     frame = first.facets.frame
     second = LoadedFace(
         body, contact_facets(other, tags.find(TOP), frame, opposed=True), first.patches

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
+from helpers.block_cases import block_of
 from helpers.contact_laws import PowerLaw
+from helpers.faces import at
 from helpers.laws_on_mesh import lay_on_mesh
+from helpers.plane_problems import rollers
 from helpers.small_scene import SMALL_SCENE
 from helpers.user_problems import (
     BOTTOM,
@@ -21,23 +23,15 @@ from helpers.user_problems import (
     clamped,
     elastic,
     marked,
+    pressed_face,
 )
-from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
-from patchlaw.geometry import BlockShape, Control, RigidPlane
+from patchlaw.geometry import Control, RigidPlane
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.macro import (
-    Block,
-    ContactProblem,
-    Interface,
-    LawContactProblem,
-    LoadedFace,
-    Material,
-    block_mesh,
-    compat,
-)
+from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedFace, compat
 from patchlaw.multiscale import Run, Scene, run
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-13}
@@ -49,21 +43,14 @@ LAW = PowerLaw(3e3)
 @pytest.mark.parametrize("element", ["P1", "P2", "Q1", "Q2"])
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_the_papers_cube_as_user_code_is_the_block(element, mode):
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3), element=element)
-    block = Block(
-        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
-    )
+    block = block_of(cells=(4, 4, 3), element=element)
     problem = LawContactProblem(LoadedFace.of_block(block, PATCHES), LAWS, mode)
-
     space = compat.vector_space(block.mesh.mesh, int(element[1]))
-    bottom = dmesh.locate_entities_boundary(space.mesh, 2, lambda x: np.isclose(x[2], -1.0))
-    held = np.array(fem.locate_dofs_topological(space, 2, bottom))
-    support = fem.dirichletbc(np.zeros(3, PETSc.ScalarType), held, space)
-    u = fem.Function(space)
-    top = dmesh.locate_entities_boundary(space.mesh, 2, lambda x: np.isclose(x[2], 0.0))
-    rough = Interface(space, None, top, laws=LAWS, patches=PATCHES, mode=mode, indenter=TILTED)
-    inner = elastic(u, degree=block.quadrature_degree)
-    user = ContactProblem(inner, u, [support], rough)
+    rough, user = pressed_face(
+        space, None, at(space.mesh, 2, 0.0), laws=LAWS, patches=PATCHES, mode=mode,
+        indenter=TILTED, work=lambda u: elastic(u, degree=block.quadrature_degree),
+        held=[clamped(space, None, tag=at(space.mesh, 2, -1.0))],
+    )  # fmt: skip
     for control in (Control(approach=8e-3, tilt=(2e-3, -1e-3)), Control(force=6.0, tilt=None)):
         if control.approach is None:
             rough.indenter = control
@@ -91,13 +78,12 @@ def test_a_law_table_gives_the_force_of_its_scene(monkeypatch):
     )
     lay_on_mesh(monkeypatch)
     table, history = Run(scene).make_laws(), run(scene)
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 8, 3))
-    mesh = block_mesh(shape, MPI.COMM_SELF)
+    mesh = block_of(cells=(4, 8, 3)).mesh
     space = compat.vector_space(mesh.mesh, 1)
-    u = fem.Function(space)
-    rough = Interface(space, mesh.facet_tags, 2, laws=table, indenter=RigidPlane(approach=4e-3))
-    support = clamped(space, mesh.facet_tags, tag=1)
-    problem = ContactProblem(elastic(u, degree=2), u, [support], rough)
+    rough, problem = pressed_face(
+        space, mesh.facet_tags, 2, laws=table, indenter=RigidPlane(approach=4e-3),
+        work=lambda u: elastic(u, degree=2), held=[clamped(space, mesh.facet_tags, tag=1)],
+    )  # fmt: skip
     for step in history:
         rough.indenter = RigidPlane(approach=step.approach_mm)
         problem.solve()
@@ -105,27 +91,12 @@ def test_a_law_table_gives_the_force_of_its_scene(monkeypatch):
         assert rough.area == pytest.approx(step.contact_area_fraction, rel=1e-8)
 
 
-def turned(angles=(0.4, -1.1, 2.0)):
-    """Return a rotation."""
-    (a, b, c), rotation = angles, np.eye(3)
-    for axis, angle in enumerate((a, b, c)):
-        i, j = [k for k in range(3) if k != axis]
-        turn = np.eye(3)
-        turn[[i, i, j, j], [i, j, i, j]] = (
-            np.cos(angle),
-            -np.sin(angle),
-            np.sin(angle),
-            np.cos(angle),
-        )
-        rotation = turn @ rotation
-    return rotation
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("cell", [TETRAHEDRA, HEXAHEDRA])
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_a_rotated_and_shifted_copy_gives_the_same(cell, mode):
-    rotation, shift, found = turned(), np.array([3.0, -20.0, 7.0]), []
+    rotation = Rotation.from_euler("xyz", (0.4, -1.1, 2.0)).as_matrix()
+    shift, found = np.array([3.0, -20.0, 7.0]), []
     for rigid in (False, True):
         mesh = box(cell=cell)
         tags = marked(mesh)
@@ -133,11 +104,9 @@ def test_a_rotated_and_shifted_copy_gives_the_same(cell, mode):
         if rigid:
             mesh.geometry.x[:] = mesh.geometry.x @ rotation.T + shift
             frame = FaceFrame(origin=shift, axes=rotation.T)
-        space = compat.vector_space(mesh, 1)
-        u = fem.Function(space)
         options = {"mode": mode, "patches": PATCHES, "frame": frame, "indenter": TILTED}
-        rough = Interface(space, tags, TOP, laws=LAWS, **options)
-        ContactProblem(elastic(u), u, [clamped(space, tags)], rough).solve()
+        rough, problem = pressed_face(compat.vector_space(mesh, 1), tags, laws=LAWS, **options)
+        problem.solve()
         found.append((rough.force, *rough.moment, *rough.patch_pressure))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9, atol=1e-11)
 
@@ -160,13 +129,13 @@ def column(height=2.0, degree=1, cell=TETRAHEDRA, layers=4):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_elastic_column_in_series_with_a_pointwise_law(cell, degree):
     young, height, approach = 500.0, 2.0, 0.05
-    _, tags, space, u = column(height, degree, cell)
-    rough = Interface(space, tags, TOP, laws=LAW, indenter=RigidPlane(approach=approach))
-    inner = elastic(u, young, poisson=0.0)
-    ContactProblem(inner, u, [clamped(space, tags)], rough, petsc_options=EXACT).solve()
-    pressure = brentq(
-        lambda p: LAW.pressure(approach - p * height / young) - p, 0.0, 40.0, xtol=1e-14
-    )
+    _, tags, space, _ = column(height, degree, cell)
+    rough, problem = pressed_face(
+        space, tags, laws=LAW, indenter=RigidPlane(approach=approach),
+        work=lambda u: elastic(u, young, poisson=0.0), solver={"petsc_options": EXACT},
+    )  # fmt: skip
+    problem.solve()
+    pressure = in_series(approach, height / young)
     assert rough.mode == "pointwise"
     assert rough.force == pytest.approx(0.25 * pressure, rel=1e-10)
     np.testing.assert_allclose(rough.pressure, pressure, rtol=1e-9)
@@ -190,44 +159,26 @@ def test_graded_column_and_thermal_strain():
         rise.value = value
         lifted = approach + value * height
         problem.solve()
-        pressure = brentq(
-            lambda p, c=lifted: LAW.pressure(c - p * compliance) - p, 0, 60, xtol=1e-14
-        )
-        assert rough.force == pytest.approx(0.25 * pressure, rel=1e-9)
+        assert rough.force == pytest.approx(0.25 * in_series(lifted, compliance), rel=1e-9)
     young.x.array[:] *= 2.0  # the matrix follows
     problem.solve()
-    pressure = brentq(lambda p: LAW.pressure(lifted - 0.5 * p * compliance) - p, 0, 60, xtol=1e-14)
-    assert rough.force == pytest.approx(0.25 * pressure, rel=1e-9)
+    assert rough.force == pytest.approx(0.25 * in_series(lifted, 0.5 * compliance), rel=1e-9)
 
 
 @pytest.mark.parametrize("in_matrix", [False, True])
 def test_two_interfaces_hold_a_slab_between_two_planes(in_matrix):
     """Half the height is a column to the plane of symmetry. Contact alone holds it along z."""
     young, height, approach = 500.0, 2.0, 0.02
-    mesh, tags, space, u = column(height)
-    sides = []
-    for axis in (0, 1):
-        facets = dmesh.locate_entities_boundary(mesh, 2, lambda x, a=axis: np.isclose(x[a], 0.0))
-        dofs = fem.locate_dofs_topological(space.sub(axis), 2, facets)
-        sides.append(fem.dirichletbc(PETSc.ScalarType(0.0), dofs, space.sub(axis)))
-    held = [] if in_matrix else [clamped(space, tags)]
+    _, tags, space, u = column(height)
+    held = rollers(space, (0, 0.0), (1, 0.0)) + ([] if in_matrix else [clamped(space, tags)])
     faces = [
         Interface(space, tags, tag, laws=LAW, indenter=RigidPlane(approach=approach))
         for tag in (TOP, BOTTOM)
     ]
-    problem = ContactProblem(
-        elastic(u, young, poisson=0.0),
-        u,
-        [*sides, *held],
-        faces,
-        petsc_options=EXACT,
-        in_matrix=in_matrix,
-    )
+    form, given = elastic(u, young, poisson=0.0), {"petsc_options": EXACT, "in_matrix": in_matrix}
+    problem = ContactProblem(form, u, held, faces, **given)
     problem.solve()
-    half = height if not in_matrix else 0.5 * height
-    pressure = brentq(
-        lambda p: LAW.pressure(approach - p * half / young) - p, 0.0, 40.0, xtol=1e-14
-    )
+    pressure = in_series(approach, (0.5 if in_matrix else 1.0) * height / young)
     assert faces[0].force == pytest.approx(0.25 * pressure, rel=1e-8)
     if in_matrix:
         assert faces[1].force == pytest.approx(faces[0].force, rel=1e-8)
@@ -240,19 +191,15 @@ def test_nodes_of_the_faces_edge_may_be_held():
     """What contact adds to constrained unknowns goes into the supports: force equals reaction."""
     mesh = box(cells=(4, 4, 3))
     tags, space = marked(mesh), compat.vector_space(mesh, 1)
-    side = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[0], 0.0))
-    nodes = fem.locate_dofs_topological(space, 2, side)
+    nodes = fem.locate_dofs_topological(space, 2, at(mesh, 0, 0.0))
     held = fem.dirichletbc(np.array([0.0, 0.0, -1e-3], PETSc.ScalarType), nodes, space)
-    u = fem.Function(space)
     for mode in ("patchwise", "pointwise"):
-        options = {"mode": mode, "patches": PATCHES, "indenter": TILTED}
-        rough = Interface(space, tags, TOP, laws=LAWS, **options)
-        problem = ContactProblem(elastic(u), u, [held], rough)
+        options = {"mode": mode, "patches": PATCHES, "indenter": TILTED, "held": [held]}
+        rough, problem = pressed_face(space, tags, laws=LAWS, **options)
         assert problem.solve() < 9
         assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
-        np.testing.assert_allclose(
-            u.x.array.reshape(-1, 3)[nodes], [[0.0, 0.0, -1e-3]] * len(nodes)
-        )
+        moved = problem.displacement.x.array.reshape(-1, 3)[nodes]
+        np.testing.assert_allclose(moved, [[0.0, 0.0, -1e-3]] * len(nodes))
 
 
 def test_large_strains_converge_quadratically():

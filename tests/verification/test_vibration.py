@@ -6,25 +6,32 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers import calculix
-from helpers.user_problems import BOTTOM, HEXAHEDRA, TOP, RangedLaw, box, clamped, elastic, marked
-from mpi4py import MPI
+from helpers.block_cases import block_of, interface_of
+from helpers.contact_laws import RangedLaw, Spring
+from helpers.plane_problems import rollers
+from helpers.user_problems import (
+    BOTTOM,
+    HEXAHEDRA,
+    TOP,
+    box,
+    clamped,
+    elastic,
+    marked,
+    pressed_face,
+)  # fmt: skip
 from petsc4py import PETSc
 from scipy.io import mmread
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from patchlaw.geometry import BlockShape, Control, Friction, PatchGrid, RigidPlane
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
 from patchlaw.macro import (
-    Block,
-    ContactProblem,
     Interface,
     LawContactProblem,
-    LoadedFace,
     Material,
     MeshedBody,
     Support,
     TaggedMesh,
-    block_mesh,
     compat,
     natural_modes,
     write_contact_stiffness,
@@ -35,19 +42,6 @@ from patchlaw.support import InputError, NotConverged
 
 YOUNG, DENSITY = 4000.0, 1.3e-9
 SPEED = np.sqrt(YOUNG / DENSITY)
-
-
-class Line:
-    """p = k c."""
-
-    def __init__(self, stiffness):
-        self._stiffness = stiffness
-
-    def pressure(self, closure):
-        return self._stiffness * closure
-
-    def stiffness(self, closure):
-        return np.full_like(closure, self._stiffness)
 
 
 def matrices(space, poisson=0.0):
@@ -70,19 +64,24 @@ def held(space, axis, where):
     return fem.dirichletbc(fem.Function(part[1]), nodes, part[0])
 
 
+def on_plane(mesh, law, degree=1, approach=1e-3, **more):
+    """A box's top under a plane, by a law; the space and the facets' tags."""
+    x = mesh.geometry.x
+    lengths = *x[:, :2].max(axis=0), -x[:, 2].min()
+    tags, space = marked(mesh, lengths), compat.vector_space(mesh, degree)
+    plane = RigidPlane(approach=approach)
+    return Interface(space, tags, TOP, laws=law, **{"indenter": plane} | more), space, tags
+
+
 def test_bar_on_a_law_vibrates_as_in_closed_form():
     length, side, law = 4.0, 0.5, 1700.0
     lengths = (side, side, length)
     mesh = box(cells=(1, 1, 32), cell=HEXAHEDRA, lengths=lengths)
-    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 2)
-    across = [
-        held(space, axis, lambda x, axis=axis: np.isclose(x[axis] % side, 0.0)) for axis in (0, 1)
-    ]
-    bcs = [clamped(space, tags), *across]
-    u = fem.Function(space)
-    rough = Interface(space, tags, TOP, laws=Line(law), indenter=RigidPlane(approach=1e-3))
+    rough, space, tags = on_plane(mesh, Spring(law), 2)
+    across = [(axis, place) for axis in (0, 1) for place in (0.0, side)]
+    bcs = [clamped(space, tags), *rollers(space, *across)]
     stiffness, mass = matrices(space)
-    contact = rough.stiffness_matrix(u)
+    contact = rough.stiffness_matrix(fem.Function(space))
     found = natural_modes(with_contact(stiffness, contact), mass, 3, bcs=bcs)
     # u = sin βz from the clamp on: E β cos βL = −k sin βL
     roots = [
@@ -104,9 +103,8 @@ def test_bar_on_a_law_vibrates_as_in_closed_form():
 def test_beam_on_springs_heaves_and_pitches_as_a_rigid_body_and_bends_by_a_shift():
     lengths, law = (24.0, 1.0, 1.5), 0.02
     mesh = box(cells=(24, 1, 2), cell=HEXAHEDRA, lengths=lengths)
-    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 2)
-    plane = [held(space, 1, lambda x: np.isclose(x[1] % 1.0, 0.0))]
-    rough = Interface(space, tags, TOP, laws=Line(law), indenter=RigidPlane(approach=0.0))
+    rough, space, _ = on_plane(mesh, Spring(law), 2)
+    plane = rollers(space, (1, 0.0), (1, 1.0))
     stiffness, mass = matrices(space)
     whole = with_contact(stiffness, rough.stiffness_matrix(fem.Function(space)))
     alone, found = (natural_modes(one, mass, 5, bcs=plane) for one in (stiffness, whole))
@@ -183,12 +181,9 @@ def test_a_preconditioner_that_finds_nothing_is_told(scale):
 
 def test_mass_of_the_plane_adds_to_the_bar():
     """One element of a bar is a spring and masses; the plane's on the law's springs beside it."""
-    law, plane, side = 900.0, 3e-9, 1.0
-    shape = BlockShape(interface=(side, side), height=1.0, cells=(1, 1, 1), element="Q1")
-    material = Material(young_modulus=YOUNG, poisson_ratio=0.0, density=DENSITY)
-    block = Block(block_mesh(shape, MPI.COMM_SELF), material, "roller")
-    face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(side, side)))
-    problem = LawContactProblem(face, [Line(law)], "pointwise")
+    law, plane = 900.0, 3e-9
+    face = interface_of(block_of("roller", YOUNG, 0.0, density=DENSITY, cells=(1, 1, 1)), (1, 1))
+    problem = LawContactProblem(face, [Spring(law)], "pointwise")
     state = problem.solve(Control(approach=1e-3))
     tangents = problem.forces.vibration_tangents(state)
     found, shares = FaceVibration(face, "pointwise", plane).modes(tangents, 2)
@@ -203,8 +198,7 @@ def test_mass_of_the_plane_adds_to_the_bar():
 def test_slepc_finds_the_same_modes_of_a_face_that_slides():
     SLEPc = pytest.importorskip("slepc4py.SLEPc")
     mesh = box(cells=(3, 2, 2), cell=HEXAHEDRA)
-    tags, space = marked(mesh), compat.vector_space(mesh, 1)
-    rough = Interface(space, tags, TOP, laws=Line(3e4), indenter=RigidPlane(approach=1e-3))
+    rough, space, _ = on_plane(mesh, Spring(3e4))
     stiffness, mass = matrices(space, 0.3)
     contact = rough.stiffness_matrix(fem.Function(space), sliding=(1.0, 0.5))
     whole = with_contact(stiffness, contact)
@@ -230,11 +224,9 @@ def test_slepc_finds_the_same_modes_of_a_face_that_slides():
 
 def face_and_tangents(friction):
     """Return the face of a block under one linear law, and the stiffnesses of its samples."""
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 4, 3), element="Q1")
-    material = Material(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY)
-    block = Block(block_mesh(shape, MPI.COMM_SELF), material)
-    face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
-    forces = LawContactProblem(face, [Line(0.0 if friction is None else 9e4)], "pointwise").forces
+    block = block_of(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY, cells=(5, 4, 3))
+    face, law = interface_of(block, (1, 1)), Spring(0.0 if friction is None else 9e4)
+    forces = LawContactProblem(face, [law], "pointwise").forces
     closure = np.full(len(forces.sampling.weight), 1e-3)
     along = None if friction is None else np.array([friction, 0.0])
     return face, forces.vibration_tangents(forces.state(closure), along)
@@ -301,15 +293,12 @@ def test_two_degrees_of_freedom_flutter_through_one_patch_as_in_closed_form(fric
     side, poisson, law = 0.7, 0.3, 2e4
     lengths = (side, side, side)
     mesh = box(cells=(1, 1, 1), cell=HEXAHEDRA, lengths=lengths)
-    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 1)
+    patch = PatchGrid(grid=(1, 1), lengths=(side, side))
+    rough, space, _ = on_plane(mesh, Spring(law), patches=patch, mode="patchwise")
     corner = np.array([side, side, 0.0])
     bcs = [held(space, axis, lambda x: ~np.isclose(x.T, corner).all(axis=1)) for axis in (0, 2)] + [
         held(space, 1, lambda x: np.ones(x.shape[1], bool))
     ]
-    patch = PatchGrid(grid=(1, 1), lengths=(side, side))
-    plane = RigidPlane(approach=1e-3)
-    options = {"patches": patch, "mode": "patchwise", "indenter": plane}
-    rough = Interface(space, tags, TOP, laws=Line(law), **options)
     stiffness, mass = matrices(space, poisson)
     contact = rough.stiffness_matrix(fem.Function(space), sliding=(friction, 0.0))
     whole = stiffness.copy()
@@ -345,13 +334,15 @@ def test_calculix_finds_our_frequencies_with_our_springs(tmp_path, sticks):
     poisson = 0.3
     mesh = box(cells=(4, 3, 3), cell=HEXAHEDRA)
     tags, space = marked(mesh), compat.vector_space(mesh, 1)
-    u, bcs = fem.Function(space), [clamped(space, tags)]
-    friction = Friction(coefficient=0.3, poisson_ratio=poisson) if sticks else None
-    plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
-    rough = Interface(space, tags, TOP, laws=RangedLaw(3e4), indenter=plane, friction=friction)
-    ContactProblem(elastic(u, YOUNG, poisson), u, bcs, rough).solve()
+    bcs = [clamped(space, tags)]
+    rough, problem = pressed_face(
+        space, tags, laws=RangedLaw(3e4), indenter=RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3)),
+        friction=Friction(coefficient=0.3, poisson_ratio=poisson) if sticks else None,
+        held=bcs, work=lambda u: elastic(u, YOUNG, poisson),
+    )  # fmt: skip
+    problem.solve()
     stiffness, mass = matrices(space, poisson)
-    contact = rough.stiffness_matrix(u)
+    contact = rough.stiffness_matrix(problem.displacement)
     found = natural_modes(with_contact(stiffness, contact), mass, 6, bcs=bcs)
     for ending in ("inp", "mtx"):
         write_contact_stiffness(tmp_path / f"contact.{ending}", contact, space)
@@ -371,9 +362,7 @@ def total(matrix):
 
 
 def test_springs_of_a_face_that_slides_are_refused(tmp_path):
-    mesh = box(cells=(1, 1, 1), cell=HEXAHEDRA)
-    tags, space = marked(mesh), compat.vector_space(mesh, 1)
-    rough = Interface(space, tags, TOP, laws=Line(1e3), indenter=RigidPlane(approach=0.0))
+    rough, space, _ = on_plane(box(cells=(1, 1, 1), cell=HEXAHEDRA), Spring(1e3))
     sliding = rough.stiffness_matrix(fem.Function(space), sliding=(0.3, 0.0))
     with pytest.raises(InputError, match="is not symmetric"):
         write_contact_stiffness(tmp_path / "contact.inp", sliding, space)
@@ -386,10 +375,7 @@ def test_springs_of_a_face_that_slides_are_refused(tmp_path):
 
 @pytest.mark.parametrize("ending", ["inp", "mtx"])
 def test_out_of_contact_there_are_no_springs(tmp_path, ending):
-    mesh = box(cells=(1, 1, 1))
-    space = compat.vector_space(mesh, 1)
-    apart = RigidPlane(approach=-1e-3)
-    rough = Interface(space, marked(mesh), TOP, laws=RangedLaw(3e3), indenter=apart)
+    rough, space, _ = on_plane(box(cells=(1, 1, 1)), RangedLaw(3e3), approach=-1e-3)
     path = tmp_path / f"free.{ending}"
     write_contact_stiffness(path, rough.stiffness_matrix(fem.Function(space)), space)
     text = path.read_text()

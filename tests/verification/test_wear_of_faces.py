@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from dolfinx import fem
-from dolfinx import mesh as dmesh
-from helpers.contact_laws import Spring
-from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clamped, elastic, marked
+from helpers.contact_laws import PowerLaw, RangedLaw, Spring
+from helpers.faces import at, tagged
+from helpers.user_problems import BOTTOM, HEXAHEDRA, box, elastic, pressed_box, pressed_face
 
 from patchlaw.geometry import Control, Friction, RigidPlane, ShearControl
-from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.macro import compat
 from patchlaw.macro.contact import newton
 from patchlaw.support import InputError, NotConverged
 
@@ -18,14 +17,9 @@ COEFFICIENT, BED = 3.7e-7, 41.3
 
 def made(laws=None, *, young=1e9, wear=COEFFICIENT, cells=(3, 2, 1), **options):
     """A box, by default next to rigid, whose top has a law and wears."""
-    mesh = box(cells=cells, cell=HEXAHEDRA)
-    space, tags = compat.vector_space(mesh, 1), marked(mesh)
-    u = fem.Function(space)
-    face = {"laws": laws or Spring(BED), "wear": wear, **options}
-    rough = Interface(space, tags, TOP, **face)
-    exact = {"snes_rtol": 1e-13, "ksp_rtol": 1e-13}
-    support = clamped(space, tags)
-    return rough, ContactProblem(elastic(u, young=young), u, [support], rough, petsc_options=exact)
+    exact = {"petsc_options": {"snes_rtol": 1e-13, "ksp_rtol": 1e-13}}
+    own = {"cells": cells, "cell": HEXAHEDRA, "work": lambda u: elastic(u, young=young)}
+    return pressed_box(laws=laws or Spring(BED), wear=wear, solver=exact, **own, **options)
 
 
 def test_a_punch_on_a_winkler_bed_wears_to_even_pressure():
@@ -124,28 +118,14 @@ def test_a_held_approach_wears_off_the_right_volume_under_a_law_that_is_no_line(
 def test_zones_wear_by_coefficients_of_their_own_however_far_a_step_slides():
     """A face that nothing bends keeps its approach: K (δ − w) = p in both zones, steep as it is."""
     mesh = box(cells=(2, 1, 1), cell=HEXAHEDRA)
-    zones = [
-        dmesh.locate_entities_boundary(
-            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 0.5) > -1e-9)
-        )
-        for side in (-1.0, 1.0)
-    ]
-    facets = np.concatenate(zones)
-    order = np.argsort(facets)
-    tags = dmesh.meshtags(mesh, 2, facets[order], np.array([5, 6], np.int32)[order])
-    space = compat.vector_space(mesh, 1)
-    u, laws, wear = (
-        fem.Function(space),
-        {"soft": Spring(30.0), "hard": Spring(4e4)},
-        {"soft": 2e-6, "hard": 5e-7},
-    )
-    bottom = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -1.0))
-    support = fem.dirichletbc(np.zeros(3), bottom, space)
-    rough = Interface(
-        space, tags, names={"soft": 5, "hard": 6}, laws=laws, wear=wear,
-        indenter=RigidPlane(approach=1e-3),
+    zones = {5: at(mesh, 2, 0.0, among=lambda x: x[0] < 0.51),
+             6: at(mesh, 2, 0.0, among=lambda x: x[0] > 0.49)}  # fmt: skip
+    tags = tagged(mesh, zones | {BOTTOM: at(mesh, 2, -1.0)})
+    laws, wear = {"soft": Spring(30.0), "hard": Spring(4e4)}, {"soft": 2e-6, "hard": 5e-7}
+    rough, problem = pressed_face(
+        compat.vector_space(mesh, 1), tags, None, names={"soft": 5, "hard": 6}, laws=laws,
+        wear=wear, indenter=RigidPlane(approach=1e-3), work=lambda u: elastic(u, young=1e10),
     )  # fmt: skip
-    problem = ContactProblem(elastic(u, young=1e10), u, [support], rough)
     expected = np.array([30.0, 4e4]) * 1e-3
     for distance in (1e2, 1e6):
         rough.slide(distance)

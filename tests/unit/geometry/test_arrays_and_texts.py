@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from helpers.map_round_trips import came_back, damage_was_told
 
+from benchmarks.map_round_trips import came_back, damage_was_told
 from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of

@@ -3,8 +3,8 @@ import pickle
 
 import numpy as np
 import pytest
-from helpers.height_files import Bomb, header
 
+from benchmarks.height_files import Bomb, header
 from patchlaw import InputError
 from patchlaw.geometry import read_surface
 

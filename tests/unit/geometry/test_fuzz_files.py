@@ -2,8 +2,9 @@
 
 import warnings
 
-from helpers.height_files import anything, read, sides
 from hypothesis import HealthCheck, given, settings
+
+from benchmarks.height_files import anything, read, sides
 
 
 @settings(

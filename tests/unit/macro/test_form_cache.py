@@ -170,6 +170,29 @@ def test_forms_that_others_can_write_are_removed(tmp_path):
         assert not (tmp_path / "libffcx_forms_theirs.c.cached").exists()
 
 
+def test_forms_are_looked_at_again_where_files_came_or_others_may_enter(tmp_path, monkeypatch):
+    folder, looked, scandir = tmp_path / "forms", [], os.scandir
+    monkeypatch.setattr(jit.os, "scandir", lambda path: looked.append(path) or scandir(path))
+
+    def looks(times):
+        looked.clear()
+        for _ in range(times):
+            with jit.trusted(folder):
+                pass
+        return len(looked)
+
+    assert looks(3) == 3  # what comes within a moment leaves the folder's time as it is
+    age(folder, 600)
+    assert looks(3) == 1
+    cut = folder / "libffcx_forms_cut.so"
+    cut.write_bytes(b"without a checksum")
+    age(cut, 600)
+    assert looks(1) == 1 and not cut.exists()
+    folder.chmod(0o755)
+    age(folder, 600)
+    assert looks(3) == 3
+
+
 def test_forms_of_others_are_not_loaded(tmp_path, monkeypatch):
     (tmp_path / "libffcx_forms_own.so").touch()
     monkeypatch.setattr(jit.os, "geteuid", lambda: 12345)

@@ -6,8 +6,8 @@ from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
 
 import pytest
-from helpers.scene_inputs import BASE
 
+from benchmarks.scene_inputs import BASE
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.runs.output.results import LIBRARIES, provenance
 

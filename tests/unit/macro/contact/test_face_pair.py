@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
-from dolfinx import mesh as dmesh
 from helpers.body_meshes import HIGH, LOW, box, hanging, standing
 from helpers.contact_laws import PowerLaw, Spring
+from helpers.faces import at, tagged
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import (
@@ -129,12 +129,8 @@ def test_a_round_body_of_curved_cells_presses_on_what_it_covers(cell, least):
     places[:, :2] += 0.5
     cells = compat.cell_nodes(nodes).astype(np.int64)
     mesh = compat.mesh_from_cells(cells, places, None, square.mesh.comm)
-    low, high = (
-        dmesh.locate_entities_boundary(mesh, 2, lambda p, z=z: np.isclose(p[2], z)) for z in (0, 1)
-    )
-    facets = np.sort(np.concatenate((low, high)))
-    tags = np.where(np.isin(facets, low), LOW, HIGH).astype(np.int32)
-    above = TaggedMesh(mesh=mesh, facet_tags=dmesh.meshtags(mesh, 2, facets, tags))
+    faces = {LOW: at(mesh, 2, 0.0), HIGH: at(mesh, 2, 1.0)}
+    above = TaggedMesh(mesh=mesh, facet_tags=tagged(mesh, faces))
     below = standing(box((0, 0, -1), (1, 1, 0), (3, 4, 1)), SLIDING, WHOLE)
     disc = hanging(above, SLIDING, WHOLE, 2)
     faces = pair(below, disc)

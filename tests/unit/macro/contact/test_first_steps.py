@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from dolfinx import fem
 from helpers.body_meshes import HIGH, LOW, box, standing
 from helpers.contact_laws import Exponential
-from helpers.user_problems import clamped, elastic
+from helpers.user_problems import clamped, elastic, pressed_face
 from mpi4py import MPI
 from scipy.optimize import brentq
 
 from patchlaw.geometry import Control, Friction, PatchGrid
-from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
+from patchlaw.macro import LawContactProblem, Material, compat
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import FirstSteps
 from patchlaw.macro.contact.pressed_plane import law_lines
@@ -118,14 +117,12 @@ def test_a_plane_that_comes_down_by_more_than_the_body_takes_few_newton_steps(le
     # single points of a facet on soft laws are held by the others of it, on stiff ones
     tagged, patches = box((0, 0, 0), (20, 10, 5), (6, 3, 2), "tetrahedron"), (len(lengths), 1)
     space = compat.vector_space(tagged.mesh, 2)
-    u, laws = fem.Function(space), [Exponential(length) for length in lengths]
-    patches = PatchGrid(grid=patches, lengths=(20.0, 10.0))
-    rough = Interface(
-        space, tagged.facet_tags, LOW, laws=laws, patches=patches, mode="pointwise",
-        indenter=Control(approach=approaches[0]),
+    rough, problem = pressed_face(
+        space, tagged.facet_tags, LOW, laws=[Exponential(length) for length in lengths],
+        patches=PatchGrid(grid=patches, lengths=(20.0, 10.0)), mode="pointwise",
+        indenter=Control(approach=approaches[0]), work=lambda u: elastic(u, 4000.0, 0.3),
+        held=[clamped(space, tagged.facet_tags, tag=HIGH)],
     )  # fmt: skip
-    held = clamped(space, tagged.facet_tags, tag=HIGH)
-    problem = ContactProblem(elastic(u, 4000.0, 0.3), u, [held], rough)
     for approach in approaches:
         rough.indenter = Control(approach=approach)
         assert problem.solve() <= 5
@@ -158,14 +155,12 @@ def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):
     laws = [Exponential(length) for length in (2e-3, 0.1e-3, 0.5e-3)]
     tagged = box((0, 0, -1), (3, 1, 0), (9, 4, 4))
     space = compat.vector_space(tagged.mesh, 1)
-    u = fem.Function(space)
-    rough = Interface(
+    rough, problem = pressed_face(
         space, tagged.facet_tags, HIGH, laws=laws, patches=THIRDS, mode=mode,
         indenter=Control(approach=10e-3), friction=friction and Friction(
             coefficient=friction, poisson_ratio=0.3),
+        work=lambda u: elastic(u, 1000.0, 0.3), held=[clamped(space, tagged.facet_tags, tag=LOW)],
     )  # fmt: skip
-    held = clamped(space, tagged.facet_tags, tag=LOW)
-    problem = ContactProblem(elastic(u, 1000.0, 0.3), u, [held], rough)
     forces = []
     for control in (
         Control(approach=10e-3),

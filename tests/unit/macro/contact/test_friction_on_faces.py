@@ -10,21 +10,12 @@ from dolfinx import fem
 from helpers.body_meshes import box as block
 from helpers.body_meshes import hanging, standing
 from helpers.contact_laws import PowerLaw, RangedLaw
-from helpers.user_problems import HEXAHEDRA, LAWS, PATCHES, TOP, box, clamped, elastic, marked
+from helpers.user_problems import HEXAHEDRA, LAWS, PATCHES, box, elastic, marked, pressed_face
 from petsc4py import PETSc
 
 from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.geometry.materials import mindlin_ratio
-from patchlaw.macro import (
-    ContactProblem,
-    ElasticBody,
-    FacePair,
-    Interface,
-    LawContactProblem,
-    LawsAtPoints,
-    Material,
-    compat,
-)
+from patchlaw.macro import ElasticBody, FacePair, LawContactProblem, LawsAtPoints, Material, compat
 from patchlaw.macro.contact import face_sliders
 from patchlaw.support import InputError, NotBalanced, NotConverged
 
@@ -36,11 +27,16 @@ LAW = RangedLaw(3e3)
 RANGED = [RangedLaw(law.k, law.touch) for law in LAWS]
 
 
-def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
+def soft_problem(cells=(2, 2, 1)):
+    """A soft box under one law with friction."""
     soft = Material(young_modulus=431.0, poisson_ratio=0.27)
     patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
-    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (3, 3, 2)), soft, patch)
-    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), cells), soft, patch)
+    return LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+
+
+def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
+    problem = soft_problem((3, 3, 2))
     shifts = [(0.0, 0.0), (2e-4, 1e-4), (-1e-4, 2e-4)]
     for force, shift in zip((0.7, 1.7, 1.7), shifts, strict=True):
         problem.solve(Control(force=force, shear=ShearControl(shift=shift)))
@@ -61,10 +57,7 @@ def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
 @pytest.mark.long
 def test_energy_errs_by_the_same_part_before_the_remembered_load_steps(monkeypatch):
     """Of three cycles all or the last two are gone again: errors of all the energy are alike."""
-    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
-    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
-    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (2, 2, 1)), soft, patch)
-    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    problem = soft_problem()
     for turn in [(2e-4, 1e-4), (1e-4, -2e-4), (-2e-4, 1e-4)] * 3:
         problem.solve(shifted(*turn))
     memory, weight = problem.sliders.memory, problem.sampling.weight
@@ -80,10 +73,7 @@ def test_energy_errs_by_the_same_part_before_the_remembered_load_steps(monkeypat
 
 def test_a_refused_load_step_leaves_sliders_and_worn_depths(monkeypatch):
     """That the supports do not bear the contact is seen after Newton's method ends."""
-    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
-    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
-    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (2, 2, 1)), soft, patch)
-    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    problem = soft_problem()
     wearing = np.full(len(problem.sampling.weight), 1e-4)
     borne = ElasticBody.borne
     monkeypatch.setattr(ElasticBody, "borne", lambda *given: 1.01 * borne(*given))
@@ -100,13 +90,9 @@ def body():
 
 
 def problem_on(body, laws=LAW, scale=1.0, **options):
-    u = fem.Function(body.space)
-    rough = Interface(
-        body.space, body.tags, TOP, laws=laws,
-        **({"indenter": Control(force=1.7), "friction": FRICTION} | options),
-    )  # fmt: skip
-    residual = scale * elastic(u)
-    return rough, ContactProblem(residual, u, [clamped(body.space, body.tags)], rough)
+    given = {"indenter": Control(force=1.7), "friction": FRICTION} | options
+    work = {"work": lambda u: scale * elastic(u)}
+    return pressed_face(body.space, body.tags, laws=laws, **work, **given)
 
 
 def shifted(x, y, **other):

@@ -11,7 +11,19 @@ import ufl
 from dolfinx import fem, io
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import PowerLaw, RangedLaw, Spring
-from helpers.user_problems import BOTTOM, LAWS, PATCHES, TOP, box, clamped, elastic, marked
+from helpers.faces import at, tagged
+from helpers.user_problems import (
+    BOTTOM,
+    LAWS,
+    PATCHES,
+    TOP,
+    box,
+    clamped,
+    elastic,
+    marked,
+    pressed_box,
+    pressed_face,
+)  # fmt: skip
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -54,6 +66,19 @@ class Tabulated(PowerLaw):
 def body():
     mesh = box(cells=(4, 4, 2))
     return SimpleNamespace(mesh=mesh, tags=marked(mesh), space=compat.vector_space(mesh, 1))
+
+
+def on_top(body, **given):
+    """The body's top as an interface, and its problem."""
+    return pressed_face(body.space, body.tags, **{"laws": LAW, "indenter": PLANE} | given)
+
+
+def halves_of_top(mesh):
+    """Facets of the halves of a top, by tags."""
+    return {
+        5: at(mesh, 2, 0.0, among=lambda x: x[0] < 0.5 + 1e-9),
+        6: at(mesh, 2, 0.0, among=lambda x: x[0] > 0.5 - 1e-9),
+    }
 
 
 def displacement(space, size=1e-3):
@@ -253,24 +278,20 @@ def test_area_and_range_of_laws(body):
     rough = Interface(space, body.tags, TOP, laws=laws, indenter=RigidPlane(approach=4e-3))
     assert rough.evaluate(fem.Function(space)).contact_area == pytest.approx(0.4)
     rough.check_range()
-    u = fem.Function(space)
-    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    rough, problem = on_top(body, laws=laws, indenter=RigidPlane(approach=4e-3))
     problem.solve()
     rough.indenter = RigidPlane(approach=9e-3)
     with pytest.raises(NotConverged, match=r"LAW_RANGE: 0\.00.*larger approach"):
         problem.solve()
     assert rough.closure.max() > 5e-3
     plain = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
-    assert plain.evaluate(u).contact_area is None
+    assert plain.evaluate(problem.displacement).contact_area is None
 
 
 def test_failure_is_named_and_keeps_the_displacement(body):
-    space = body.space
-    u = fem.Function(space)
-    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
-    support = clamped(space, body.tags)
-    problem = ContactProblem(elastic(u), u, [support], rough)
+    rough, problem = on_top(body)
     problem.solve()
+    u, support = problem.displacement, clamped(body.space, body.tags)
     known, force = u.x.array.copy(), rough.force
     few = ContactProblem(elastic(u), u, [support], rough, petsc_options={"snes_max_it": 1})
     rough.indenter = RigidPlane(approach=9e-3)
@@ -300,10 +321,7 @@ def test_problems_that_do_not_fit(body):
 
 
 def test_linear_bodies_keep_their_matrix(body, monkeypatch):
-    space, u = body.space, fem.Function(body.space)
-    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
-    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
-    made = []
+    (rough, problem), made = on_top(body), []
     monkeypatch.setattr(compat, "assemble_matrix_into", lambda *_: made.append(1))
     for approach in (4e-3, 6e-3):
         rough.indenter = RigidPlane(approach=approach)
@@ -315,16 +333,9 @@ def test_linear_bodies_keep_their_matrix(body, monkeypatch):
 @pytest.mark.parametrize("in_matrix", [False, True])
 def test_law_a_hundred_thousand_times_as_stiff_as_the_body(body, in_matrix):
     """The preconditioner smooths with the body's matrix alone, and stays definite."""
-    space, u = body.space, fem.Function(body.space)
-    rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e8), indenter=RigidPlane(approach=8e-3))
-    problem = ContactProblem(
-        elastic(u),
-        u,
-        [clamped(space, body.tags)],
-        rough,
-        petsc_options={"pc_type": "gamg"},
-        in_matrix=in_matrix,
-    )
+    solver = {"petsc_options": {"pc_type": "gamg"}, "in_matrix": in_matrix}
+    plane = RigidPlane(approach=8e-3)
+    rough, problem = on_top(body, laws=PowerLaw(3e8), indenter=plane, solver=solver)
     assert problem.solve() < 15
     assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
     rough.indenter = Control(force=10.0, tilt=None)  # whose tangent cannot be assembled
@@ -336,30 +347,26 @@ def test_law_a_hundred_thousand_times_as_stiff_as_the_body(body, in_matrix):
 @pytest.mark.parametrize("indenter", [PLANE, Control(force=500.0, tilt=None)])
 def test_laws_at_points_are_known_to_the_preconditioner(indenter):
     mesh = box(cells=(12, 12, 8))
-    space, tags, spent, found = compat.vector_space(mesh, 1), marked(mesh), {}, {}
+    face, spent, found = (compat.vector_space(mesh, 1), marked(mesh)), {}, {}
     for in_matrix in (True, False):
-        u = fem.Function(space)
-        rough = Interface(space, tags, TOP, laws=PowerLaw(3e7), indenter=indenter)
-        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough, in_matrix=in_matrix)
+        given = {"laws": PowerLaw(3e7), "indenter": indenter}
+        rough, problem = pressed_face(*face, solver={"in_matrix": in_matrix}, **given)
         steps = problem.solve()
         spent[in_matrix] = problem.report.linear_iterations / steps
-        found[in_matrix] = rough.force, *rough.moment, np.linalg.norm(u.x.array)
+        moved = np.linalg.norm(problem.displacement.x.array)
+        found[in_matrix] = rough.force, *rough.moment, moved
     assert spent[True] < min(20, 0.6 * spent[False])
     np.testing.assert_allclose(found[True], found[False], rtol=1e-7, atol=1e-7)
 
 
 def test_springs_in_the_matrix_follow_a_material_that_changes(body):
     """A new modulus has the matrix assembled anew: springs of before must not stay in, or out."""
-    space = body.space
     modulus = fem.Constant(body.mesh, PETSc.ScalarType(1.0))
 
     def forces(in_matrix):
-        modulus.value = 1.0
-        u = fem.Function(space)
-        rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e5), indenter=PLANE)
-        held = [clamped(space, body.tags)]
-        problem = ContactProblem(modulus * elastic(u), u, held, rough, in_matrix=in_matrix)
-        found = []
+        modulus.value, found = 1.0, []
+        own = {"work": lambda u: modulus * elastic(u), "solver": {"in_matrix": in_matrix}}
+        rough, problem = on_top(body, laws=PowerLaw(3e5), **own)
         for value, plane in ((1.0, PLANE), (3.0, PLANE), (3.0, TILTED), (0.2, TILTED)):
             modulus.value, rough.indenter = value, plane
             assert problem.solve() < 12
@@ -371,13 +378,12 @@ def test_springs_in_the_matrix_follow_a_material_that_changes(body):
 
 def test_one_interface_in_two_problems(body):
     """What one problem's matrix keeps of the laws is nothing to the other's."""
-    space, problems = body.space, []
+    space, problems, steps, forces = body.space, [], [], []
     rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
     for factor in (1.0, 20.0):
         u = fem.Function(space)
         held = [clamped(space, body.tags)]
         problems.append(ContactProblem(factor * elastic(u), u, held, rough))
-    steps, forces = [], []
     for approach in (4e-3, 6e-3, 8e-3):
         for problem in problems:
             rough.indenter = RigidPlane(approach=approach)
@@ -385,10 +391,8 @@ def test_one_interface_in_two_problems(body):
             forces.append(rough.force)
     assert max(steps) < 10
     for factor, found in zip((1.0, 20.0), (forces[0::2], forces[1::2]), strict=True):
-        u = fem.Function(space)
-        alone = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
-        held = [clamped(space, body.tags)]
-        problem = ContactProblem(factor * elastic(u), u, held, alone, in_matrix=False)
+        own = {"work": lambda u, factor=factor: factor * elastic(u), "solver": {"in_matrix": False}}
+        alone, problem = on_top(body, laws=PowerLaw(3e6), **own)
         for approach, force in zip((4e-3, 6e-3, 8e-3), found, strict=True):
             alone.indenter = RigidPlane(approach=approach)
             problem.solve()
@@ -396,9 +400,7 @@ def test_one_interface_in_two_problems(body):
 
 
 def test_problems_are_freed(body):
-    space, u = body.space, fem.Function(body.space)
-    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
-    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    rough, problem = on_top(body)
     problem.solve()
     kept = weakref.ref(problem), weakref.ref(rough)
     del problem, rough
@@ -503,21 +505,10 @@ def test_fields_are_functions_of_the_mesh(mode, degree, tmp_path):
 def zoned(friction=None, **options):
     """A box whose top has two zones, and the interface and problem of them."""
     mesh = box(cells=(6, 4, 3))
-    halves = [
-        dmesh.locate_entities_boundary(
-            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 0.5) > -1e-9)
-        )
-        for side in (-1.0, 1.0)
-    ]
-    bottom = marked(mesh).find(BOTTOM)
-    facets = np.concatenate([*halves, bottom])
-    values = np.repeat(np.array([5, 6, BOTTOM], np.int32), list(map(len, [*halves, bottom])))
-    order = np.argsort(facets)
-    tags = dmesh.meshtags(mesh, 2, facets[order], values[order])
+    tags = tagged(mesh, halves_of_top(mesh) | {BOTTOM: at(mesh, 2, -1.0)})
+    names = {"soft": 5, "hard": 6}
     space = compat.vector_space(mesh, 1)
-    u = fem.Function(space)
-    rough = Interface(space, tags, names={"soft": 5, "hard": 6}, friction=friction, **options)
-    return rough, ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+    return pressed_face(space, tags, None, names=names, friction=friction, **options)
 
 
 SOFT, HARD = RangedLaw(1e4, end=1.0), RangedLaw(4e4, touch=1e-3, end=1.0)
@@ -529,15 +520,12 @@ def test_zones_by_name_are_patches_of_the_same_outline():
     indenter = Control(force=3.7, tilt=None)
     rough, problem = zoned(laws=ZONES, crown=crown, indenter=indenter)
     problem.solve()
-    mesh = box(cells=(6, 4, 3))
-    tags, space = marked(mesh), compat.vector_space(mesh, 1)
-    u = fem.Function(space)
-    known = Interface(
-        space, tags, TOP, laws=[SOFT, HARD], mode="pointwise", indenter=indenter,
+    known, problem = pressed_box(
+        cells=(6, 4, 3), laws=[SOFT, HARD], mode="pointwise", indenter=indenter,
         patches=PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)),
         crown=lambda x, y: 1e-3 * np.maximum(x - 0.5, 0.0),
     )  # fmt: skip
-    ContactProblem(elastic(u), u, [clamped(space, tags)], known).solve()
+    problem.solve()
     np.testing.assert_allclose(rough.patch_pressure, known.patch_pressure, rtol=1e-8)
     assert rough.plane.approach == pytest.approx(known.plane.approach, rel=1e-8)
     np.testing.assert_allclose(rough.plane.tilt, known.plane.tilt, rtol=1e-7)

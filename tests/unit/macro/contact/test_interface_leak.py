@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from dolfinx import fem
-from dolfinx import mesh as dmesh
+from helpers.faces import at as side
 from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 
 from patchlaw.geometry import Control, PatchGrid, Regions, RigidPlane
@@ -32,10 +32,6 @@ class LeakingLaw(PowerLaw):
     def transmissivities(self, closure):
         along, across = (np.full_like(closure, one) for one in T)
         return np.stack([along, across], axis=1) * (closure[:, None] / 1e-3) ** self.power_of_leak
-
-
-def side(mesh, axis, at):
-    return dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[axis], at))
 
 
 def interface(cell=TETRAHEDRA, law=None, plane=None, **options):
@@ -118,7 +114,7 @@ def test_lays_that_follow_a_ring(cell):
     mesh = box(cells=(6, 10, 1), cell=cell)
     radius, angle = 4.0 + mesh.geometry.x[:, 0], 0.8 * mesh.geometry.x[:, 1]
     inner, outer = side(mesh, 0, 0.0), side(mesh, 0, 1.0)
-    top = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    top = side(mesh, 2, 0.0)
     axis = np.array([3.0, -2.0])
     mesh.geometry.x[:, 0] = axis[0] + radius * np.cos(angle)
     mesh.geometry.x[:, 1] = axis[1] + radius * np.sin(angle)

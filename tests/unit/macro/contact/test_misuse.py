@@ -6,18 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from dolfinx import fem
+from helpers.contact_laws import PowerLaw, RangedLaw
+from helpers.plane_problems import rollers
 from helpers.user_problems import (
     BOTTOM,
     LAWS,
     PATCHES,
     TOP,
-    PowerLaw,
-    RangedLaw,
     box,
     clamped,
     elastic,
     marked,
-)
+    pressed_face,
+)  # fmt: skip
 from petsc4py import PETSc
 
 from patchlaw.geometry import Control, RigidPlane
@@ -139,11 +140,12 @@ def test_options_that_petsc_does_not_read_are_named(body, name):
 ], ids=str)  # fmt: skip
 def test_direct_solvers_do_not_change_forces(body, mode, options):
     """On a law ten times as stiff as the body, where steps without contact in them diverge."""
-    forces, support = [], clamped(body.space, body.tags)
+    forces = []
     for given in (None, options):
-        u = fem.Function(body.space)
-        rough = interface(body, laws=[PowerLaw(3e6)] * 4, patches=PATCHES, mode=mode)
-        ContactProblem(elastic(u), u, [support], rough, petsc_options=given).solve()
+        face = {"laws": [PowerLaw(3e6)] * 4, "patches": PATCHES, "mode": mode, "indenter": PLANE}
+        solver = {"petsc_options": given}
+        rough, problem = pressed_face(body.space, body.tags, solver=solver, **face)
+        problem.solve()
         rough.indenter = Control(force=5.0, tilt=None)
         forces.append([rough.force, *rough.patch_pressure])
     # Newton's method ends at 1e-9 of the contact forces
@@ -156,18 +158,11 @@ def test_no_force_is_the_last_touch_of_the_deformed_body(degree):
     random = np.random.default_rng(28)
     strain, touch = random.uniform(-1e-3, 1e-3), random.uniform(-1e-3, 1e-3)
     mesh = box(cells=(3, 4, 2))
-    space, tags, conditions = compat.vector_space(mesh, degree), marked(mesh), []
-    for axis, at in enumerate((0.0, 0.0, -1.0)):
-        part = space.sub(axis)
-        collapsed = part.collapse()[0]
-        dofs = fem.locate_dofs_geometrical(
-            (part, collapsed), lambda x, axis=axis, at=at: np.isclose(x[axis], at)
-        )
-        conditions.append(fem.dirichletbc(fem.Function(collapsed), dofs, part))
-    u = fem.Function(space)
-    unloaded, law = Control(force=0.0), PowerLaw(3e3, touch=touch)
-    rough = Interface(space, tags, TOP, laws=law, indenter=unloaded)
-    problem = ContactProblem(elastic(u, thermal=strain), u, conditions, rough)
+    space, unloaded = compat.vector_space(mesh, degree), Control(force=0.0)
+    rough, problem = pressed_face(
+        space, marked(mesh), laws=PowerLaw(3e3, touch=touch), indenter=unloaded,
+        work=lambda u: elastic(u, thermal=strain), held=rollers(space, (0, 0.0), (1, 0.0), (2, -1)),
+    )  # fmt: skip
     for loaded in (False, True):
         if loaded:  # and unloaded again
             rough.indenter = Control(force=7.0)

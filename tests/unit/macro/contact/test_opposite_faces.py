@@ -6,6 +6,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import Exponential, PowerLaw, RangedLaw, Spring
+from helpers.faces import at, tagged
 from helpers.user_problems import (
     APART,
     DISC,
@@ -19,24 +20,25 @@ from helpers.user_problems import (
     SIDES,
     cells_of,
     clamped,
+    elastic,
+    pressed_face,
     stacked,
     work,
 )
 from mpi4py import MPI
 
 from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
-from patchlaw.macro import ContactProblem, Interface, LawsAtPoints, compat
+from patchlaw.macro import Interface, LawsAtPoints, compat
 from patchlaw.support import InputError
 
 
-def pressed(law, moved, comm=MPI.COMM_SELF, disc=(6, 4, 2), poisson=0.0, **options):
+def pressed(law, moved, face=DISC, opposite=PAD, disc=(6, 4, 2), poisson=0.0, **options):
     """Press the pad on the disc by moving its back, and return interface and problem."""
-    mesh, tags = stacked(disc, comm=comm)
+    mesh, tags = stacked(disc)
     space = compat.vector_space(mesh, 1)
-    u = fem.Function(space)
     held = [clamped(space, tags, tag=LOW), clamped(space, tags, (0.0, 0.0, -moved), tag=HIGH)]
-    rough = Interface(space, tags, DISC, opposite=PAD, laws=law, **options)
-    return rough, ContactProblem(work(u, poisson), u, held, rough)
+    own = {"work": lambda u: work(u, poisson), "held": held, "opposite": opposite}
+    return pressed_face(space, tags, face, laws=law, **own, **options)
 
 
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
@@ -61,24 +63,16 @@ def test_the_pressure_is_that_under_either_face():
     problem.solve()
     back = problem.reaction()  # of both supports together
     assert np.abs(back).max() < 1e-8 * one.force
-    mesh, tags = stacked((5, 3, 2))
-    space = compat.vector_space(mesh, 1)
-    u = fem.Function(space)
-    held = [clamped(space, tags, tag=LOW), clamped(space, tags, (0.0, 0.0, -9e-3), tag=HIGH)]
-    other = Interface(space, tags, PAD, opposite=DISC, laws=law)
-    ContactProblem(work(u, 0.3), u, held, other).solve()
+    other, problem = pressed(law, 9e-3, PAD, DISC, disc=(5, 3, 2), poisson=0.3)
+    problem.solve()
     # quadrature on one or the other of two coarse, non-matching faces
     assert one.force == pytest.approx(other.force, rel=2e-3)
 
 
 @pytest.mark.parametrize("in_matrix", [True, False])
 def test_stiff_laws_between_two_faces_take_few_steps(in_matrix):
-
-    rough, problem = pressed(Exponential(0.1e-3), 12e-3, poisson=0.3)
-    problem = ContactProblem(
-        work(problem.displacement, 0.3), problem.displacement, problem._equations._bcs, rough,
-        in_matrix=in_matrix,
-    )  # fmt: skip
+    solver = {"in_matrix": in_matrix}
+    rough, problem = pressed(Exponential(0.1e-3), 12e-3, poisson=0.3, solver=solver)
     assert problem.solve() <= 6
     assert np.abs(problem.reaction()).max() < 1e-7 * rough.force
     # nearly rigid: the bars alone, within Poisson's effect of flat bars
@@ -89,16 +83,13 @@ def test_stiff_laws_between_two_faces_take_few_steps(in_matrix):
 def test_a_pad_held_by_contact_and_friction_alone():
     mesh, tags = stacked()
     space = compat.vector_space(mesh, 1)
-    u, v = fem.Function(space), ufl.TestFunction(space)
-    back = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(HIGH)
-    pull = work(u) + 4.0 * v[2] * back - 0.3 * v[0] * back
-    friction = Friction(coefficient=0.5, poisson_ratio=0.0)
-    law = RangedLaw(3e4, end=1.0)
-    rough = Interface(
-        space, tags, DISC, opposite=PAD, laws=law, friction=friction,
-        indenter=RigidPlane(approach=3e-3),
+    v, back = ufl.TestFunction(space), ufl.Measure("ds", domain=mesh, subdomain_data=tags)(HIGH)
+    rough, problem = pressed_face(
+        space, tags, DISC, opposite=PAD, laws=RangedLaw(3e4, end=1.0),
+        friction=Friction(coefficient=0.5, poisson_ratio=0.0), indenter=RigidPlane(approach=3e-3),
+        work=lambda u: work(u) + 4.0 * v[2] * back - 0.3 * v[0] * back,
+        held=[clamped(space, tags, tag=LOW)],
     )  # fmt: skip
-    problem = ContactProblem(pull, u, [clamped(space, tags, tag=LOW)], rough)
     problem.solve()
     assert rough.force == pytest.approx(4.0 * 6.0, rel=1e-7)
     # what shears the pad is borne by the disc, along the axes of its face
@@ -128,25 +119,16 @@ def test_one_plane_on_two_faces_has_their_total_force_and_no_moment():
     other, second = cells_of((2.0, 0, -1.0), (2.0 + lengths[0], lengths[1], 0.0), (2, 3, 2))
     cells, points = np.vstack([one, other + len(first)]), np.vstack([first, second])
     mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, MPI.COMM_SELF)
-    faces = [
-        dmesh.locate_entities_boundary(
-            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 1.0) > 0.0)
-        )
-        for side in (-1.0, 1.0)
-    ]
-    low = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], -1.0))
-    facets = np.concatenate([*faces, low])
-    values = np.repeat(np.array([DISC, PAD, LOW], np.int32), list(map(len, [*faces, low])))
-    order = np.argsort(facets)
-    tags = dmesh.meshtags(mesh, 2, facets[order], values[order])
+    feet = {DISC: at(mesh, 2, 0.0, among=lambda x: x[0] < 1.0),
+            PAD: at(mesh, 2, 0.0, among=lambda x: x[0] > 1.0)}  # fmt: skip
+    tags = tagged(mesh, feet | {LOW: at(mesh, 2, -1.0)})
     space = compat.vector_space(mesh, 1)
-    u, v = fem.Function(space), ufl.TestFunction(space)
-    both = Interface(
-        space, tags, laws={DISC: Spring(2e3), PAD: Spring(9e3)},
-        indenter=Control(force=3.7, tilt=None),
+    both, problem = pressed_face(
+        space, tags, None, laws={DISC: Spring(2e3), PAD: Spring(9e3)},
+        indenter=Control(force=3.7, tilt=None), held=[clamped(space, tags, tag=LOW)],
+        work=lambda u: elastic(u, young=3000.0, poisson=0.0),
     )  # fmt: skip
-    form = 3000.0 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx
-    ContactProblem(form, u, [clamped(space, tags, tag=LOW)], both).solve()
+    problem.solve()
     assert both.force == pytest.approx(3.7, rel=1e-9)
     np.testing.assert_allclose(both.moment, 0.0, atol=1e-9)
     # alike areas at alike distances from the middle bear half of it each, but for the moments that
@@ -165,22 +147,16 @@ def test_patches_are_as_large_as_what_both_faces_have_in_common():
     other, second = cells_of((0, 0, 1.0), (3.0, 2.0, 2.0), pad)
     cells, points = np.vstack([one, other + len(first)]), np.vstack([first, second])
     mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, MPI.COMM_SELF)
-    mesh.topology.create_connectivity(2, 3)
-    outer = dmesh.exterior_facet_indices(mesh.topology)
-    middle = (
-        dmesh.compute_midpoints(mesh, 2, outer) if hasattr(dmesh, "compute_midpoints") else None
-    )
-    level = outer[np.abs(middle[:, 2] - 1.0) < 1e-9]
+    level = at(mesh, 2, 1.0)
     cell_of = mesh.topology.connectivity(2, 3)
     below = np.array([cell_of.links(f)[0] for f in level])
     heights = dmesh.compute_midpoints(mesh, 3, below)[:, 2]
     lower, upper = level[heights < 1.0], level[heights > 1.0]
     space = compat.vector_space(mesh, 1)
     patches = PatchGrid(grid=(4, 1), lengths=(4.0, 2.0))
-    rough = Interface(
-        space, None, lower, opposite=upper, laws=[Spring(7e3)] * 4, patches=patches,
-        mode="pointwise", indenter=RigidPlane(approach=2e-3),
-    )  # fmt: skip
+    options = {"opposite": upper, "indenter": RigidPlane(approach=2e-3)}
+    laws = {"laws": [Spring(7e3)] * 4, "patches": patches}
+    rough = Interface(space, None, lower, mode="pointwise", **options, **laws)
     rough.evaluate(fem.Function(space))
     bears = rough.patch_pressure > 0.0
     assert bears.sum() == 3
@@ -188,8 +164,7 @@ def test_patches_are_as_large_as_what_both_faces_have_in_common():
     np.testing.assert_allclose(rough.patch_closure[bears], 2e-3, rtol=1e-12)
     assert np.isnan(rough.patch_closure[~bears]).all()
     halves = PatchGrid(grid=(2, 1), lengths=(4.0, 2.0))
-    options = {"opposite": upper, "laws": [Spring(7e3)] * 2, "patches": halves}
-    options["indenter"] = RigidPlane(approach=2e-3)
+    options |= {"laws": [Spring(7e3)] * 2, "patches": halves}
     rough = Interface(space, None, lower, mode="pointwise", **options)
     rough.evaluate(fem.Function(space))
     np.testing.assert_allclose(rough.patch_pressure, 14.0, rtol=1e-12)

@@ -8,6 +8,8 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import PowerLaw, Spring
+from helpers.faces import at, tagged
+from helpers.plane_problems import rectangle
 from helpers.user_problems import (
     APART,
     DISC,
@@ -23,6 +25,7 @@ from helpers.user_problems import (
     TETRAHEDRA,
     clamped,
     pad_and_disc,
+    pressed_face,
     stacked,
     work,
 )
@@ -35,12 +38,11 @@ from patchlaw.support import InputError
 
 def force(mesh, tags, faces, law, poisson=0.3):
     """The force between pad and disc in one mesh."""
-    space = compat.vector_space(mesh, 1)
-    u = fem.Function(space)
-    low, high, disc, pad = faces
+    space, (low, high, disc, pad) = compat.vector_space(mesh, 1), faces
     held = [clamped(space, tags, tag=low), clamped(space, tags, (0.0, 0.0, -9e-3), tag=high)]
-    rough = Interface(space, tags, disc, opposite=pad, laws=law)
-    ContactProblem(work(u, poisson), u, held, rough).solve()
+    own = {"work": lambda u: work(u, poisson), "held": held}
+    rough, problem = pressed_face(space, tags, disc, opposite=pad, laws=law, **own)
+    problem.solve()
     return rough.force
 
 
@@ -110,18 +112,9 @@ def test_names_areas_and_volumes_of_several_groups():
 
 def test_plane_meshes_are_joined():
     def strip(lower, upper, cells):
-        mesh = dmesh.create_rectangle(
-            MPI.COMM_SELF, [lower, upper], cells, dmesh.CellType.quadrilateral
-        )
-        at = [
-            dmesh.locate_entities_boundary(mesh, 1, lambda x, y=y: np.isclose(x[1], y))
-            for y in (lower[1], upper[1])
-        ]
-        order = np.argsort(np.concatenate(at))
-        values = np.repeat(np.array([1, 2], np.int32), list(map(len, at)))
-        return TaggedMesh(
-            mesh=mesh, facet_tags=dmesh.meshtags(mesh, 1, np.concatenate(at)[order], values[order])
-        )
+        mesh = rectangle(lower, upper, cells)
+        ends = {1: at(mesh, 1, lower[1]), 2: at(mesh, 1, upper[1])}
+        return TaggedMesh(mesh=mesh, facet_tags=tagged(mesh, ends))
 
     whole = joined_meshes(
         {"foot": strip([0, 0], [3, 1], [6, 2]), "head": strip([0, 1], [3, 3], [3, 3])}
@@ -168,7 +161,7 @@ def stacked_curved():
     top = dmesh.locate_entities_boundary(
         mesh, 2, lambda x: np.isclose(x[2], 1.0 + x[0] ** 2 / 10.0 + x[1] ** 2 / 7.0)
     )
-    return mesh, dmesh.meshtags(mesh, 2, np.sort(top), np.full(len(top), 3, np.int32))
+    return mesh, tagged(mesh, {3: top})
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
+from helpers.faces import tagged
 from mpi4py import MPI
 
 from patchlaw.geometry import Control, Material, PatchGrid
@@ -117,15 +118,12 @@ def joined(tmp_path):
         return dmesh.locate_entities(mesh, 2, lambda x: np.isclose(x[axis], place))
 
     partly = np.concatenate([at(2, 1.5)[:4], at(0, 0.0)])
-    facets = [at(2, 2.0), at(2, 0.0), at(2, 1.0), partly]
-    values = np.repeat(np.arange(1, 5), [len(some) for some in facets]).astype(np.int32)
-    order = np.argsort(np.concatenate(facets))
-    tags = dmesh.meshtags(mesh, 2, np.concatenate(facets)[order].astype(np.int32), values[order])
+    tags = tagged(mesh, {1: at(2, 2.0), 2: at(2, 0.0), 3: at(2, 1.0), 4: partly})
     names = {"top": 1, "bottom": 2, "between": 3, "partly": 4}
-    tagged = TaggedMesh(mesh=mesh, facet_tags=tags, facet_names=names)
-    write_mesh(tagged, tmp_path / "joined.xdmf")
+    whole_mesh = TaggedMesh(mesh=mesh, facet_tags=tags, facet_names=names)
+    write_mesh(whole_mesh, tmp_path / "joined.xdmf")
     whole = {"mesh": str(tmp_path / "joined.xdmf"), "contact": "top"}
-    return tagged, whole | {"supports": [{"surface": "bottom"}]} | STEEL
+    return whole_mesh, whole | {"supports": [{"surface": "bottom"}]} | STEEL
 
 
 @pytest.mark.parametrize("face", ["between", "partly"])

@@ -4,10 +4,10 @@ import os
 import re
 
 import pytest
-from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.scene.scene import MOST_BYTES

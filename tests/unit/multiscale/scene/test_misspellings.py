@@ -1,7 +1,8 @@
 """Misspelt keys and units are refused, and the right ones offered."""
 
-from helpers import misspellings
 from hypothesis import given, settings
+
+from benchmarks import misspellings
 
 FEW = settings(max_examples=60, derandomize=True, database=None, deadline=None)
 

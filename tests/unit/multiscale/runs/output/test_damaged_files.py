@@ -5,11 +5,11 @@ import os
 import h5py
 import numpy as np
 import pytest
-from helpers.scene_inputs import BASE
-from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.scene_inputs import BASE
+from benchmarks.stored_inputs import READERS, flipped, originals, read, rewritten
 from patchlaw.multiscale import read_laws
 from patchlaw.multiscale.results.files import csv_rows, result_of_a_run
 from patchlaw.multiscale.runs.cases import Journal

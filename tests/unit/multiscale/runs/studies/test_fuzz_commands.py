@@ -1,9 +1,10 @@
 """Comparisons of any scenes, and command lines of any words, end in order or in one line."""
 
-from helpers.command_words import called, lines
-from helpers.compared_inputs import asked, compared
-from helpers.scene_inputs import BASE, toml
 from hypothesis import HealthCheck, given, settings
+
+from benchmarks.command_words import called, lines
+from benchmarks.compared_inputs import asked, compared
+from benchmarks.scene_inputs import BASE, toml
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

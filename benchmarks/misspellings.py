@@ -4,7 +4,7 @@ import re
 
 from hypothesis import strategies as st
 
-from helpers.scene_inputs import BASE, put
+from benchmarks.scene_inputs import BASE, put
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.support import InputError

@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 from hypothesis import strategies as st
 
-from helpers.scene_inputs import scenes, takes_long
+from benchmarks.scene_inputs import scenes, takes_long
 from patchlaw.multiscale import Scene, compare
 from patchlaw.multiscale.cli.studies import comparison_html
 from patchlaw.multiscale.results.files import table_files

@@ -5,7 +5,7 @@ from io import StringIO
 
 from hypothesis import strategies as st
 
-from helpers.scene_inputs import KEYS, odd_text
+from benchmarks.scene_inputs import KEYS, odd_text
 from patchlaw.multiscale.cli.command_line import main
 
 COMMANDS = (

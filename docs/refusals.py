@@ -1,6 +1,6 @@
 """Prints every text with which the packages refuse something, by exit code and module.
 
-``python tests/house/refusals.py > refusals.md`` makes a page of Markdown.
+``python docs/refusals.py > refusals.md`` makes a page of Markdown.
 """
 
 import ast
@@ -8,7 +8,7 @@ import sys
 from itertools import groupby
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PACKAGES = ("support", "geometry", "micro", "macro", "multiscale")
 CODES = {"InputError": 2, "NotConverged": 3, "Stopped": 4, "NotWritten": 5, "OutOfMemory": 5}
 PROBLEMS = ("problem", "text", "message")  # names that the texts of errors are bound to
