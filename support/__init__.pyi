@@ -4,6 +4,7 @@ from .arguments import KEY as KEY
 from .arguments import Comm as Comm
 from .arguments import Count as Count
 from .arguments import Density as Density
+from .arguments import Distance as Distance
 from .arguments import Has as Has
 from .arguments import Heights as Heights
 from .arguments import Length as Length
@@ -15,7 +16,6 @@ from .arguments import PositivePressure as PositivePressure
 from .arguments import Pressure as Pressure
 from .arguments import Slope as Slope
 from .arguments import Tag as Tag
-from .arguments import Unit as Unit
 from .arguments import changed_fields as changed_fields
 from .arguments import check_fields as check_fields
 from .arguments import checked as checked
@@ -63,3 +63,4 @@ from .parallel import on_rows as on_rows
 from .parallel import place_in as place_in
 from .parallel import shared as shared
 from .parallel import together as together
+from .quantities import Unit as Unit

@@ -24,31 +24,17 @@ from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache, wraps
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError, shortened
+from patchlaw.support.quantities import Unit
 
 KEY = "key"
 """Metadata of a dataclass's field: its name in scene files; None where it is no key of theirs."""
-
-
-@dataclass(frozen=True, slots=True)
-class Unit:
-    """Unit of a number, or of several.
-
-    Args:
-        name: The unit in pint's notation; empty for a ratio.
-        several: Whether the field holds a tuple, for which users may write one number or a list.
-        pairs: Whether it holds a tuple of pairs along x and y, for which users may write one pair.
-    """
-
-    name: str
-    several: bool = False
-    pairs: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +52,15 @@ class Limits:
     ge: float | None = None
     lt: float | None = None
     le: float | None = None
+    __is_annotated_types_grouped_metadata__: ClassVar = True
+
+    def __iter__(self) -> Iterator[Any]:
+        """Yield what this stands for beside a type that pydantic reads."""
+        import annotated_types
+
+        for name in ("gt", "ge", "lt", "le"):
+            if (bound := getattr(self, name)) is not None:
+                yield getattr(annotated_types, name.title())(bound)
 
     def problem(self, value: float) -> str:
         """Return what is wrong with a number, in pydantic's words; empty for nothing."""
@@ -83,6 +78,7 @@ class Limits:
 Positive = Limits(gt=0)
 Length = Annotated[float, Unit("mm")]
 PositiveLength = Annotated[float, Unit("mm"), Positive]
+Distance = Annotated[float, Unit("mm", zero=True), Limits(ge=0)]
 Pressure = Annotated[float, Unit("MPa")]
 PositivePressure = Annotated[float, Unit("MPa"), Positive]
 Slope = Annotated[float, Unit("")]

@@ -16,7 +16,7 @@ import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.support import Array, Counts, Indices, InputError, cell_counts, positive_lengths
-from patchlaw.support.arguments import Count, Length, Limits, PositiveLength, check_fields
+from patchlaw.support.arguments import Count, Distance, Limits, PositiveLength, check_fields
 
 CellCounts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]
@@ -205,7 +205,7 @@ class BlockMeshing:
 
     element: str = "Q1"
     grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
-    margin: Annotated[Length, Limits(ge=0)] = 0.0
+    margin: Distance = 0.0
     margin_cells: Count = 8
     margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
 

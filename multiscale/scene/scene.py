@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,7 @@ import numpy as np
 from patchlaw.multiscale.scene.rules import check_together
 from patchlaw.multiscale.scene.schema import flat, keys_beside, read, scene_keys, to_dict
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support import KEY, InputError, checked, did_you_mean, reading
+from patchlaw.support import KEY, InputError, checked, did_you_mean, part_of, reading
 from patchlaw.support.displayed import Displayed, Table
 
 MOST_BYTES = 64 * 1024
@@ -249,8 +249,8 @@ class Scene(Displayed, SceneSections):
         data = _copied(data)
         try:
             refuse_removed(data)
-            sections = read(cls, data, _unknown_key)
-            scene = replace(sections, source=source, written=data)
+            sections = read(SceneSections, data, _unknown_key)
+            scene = cls(**part_of(sections, SceneSections), source=source, written=data)
             check_together(scene, scene.stated("coupling"))
         except InputError as error:
             raise error.located(file=str(source) if source else None) from None

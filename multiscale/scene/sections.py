@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
@@ -27,6 +27,7 @@ from patchlaw.multiscale.scene.body_sections import (
 from patchlaw.support import (
     KEY,
     Count,
+    Distance,
     Heights,
     InputError,
     Length,
@@ -341,7 +342,7 @@ class ConductanceSection:
     conductivity: Annotated[tuple[float, ...], Unit("W/m/K", several=True)] | None = None
     resistivity: Annotated[tuple[float, ...], Unit("ohm*m", several=True)] | None = None
     gas: Annotated[float, Unit("W/m/K"), Positive] | None = None
-    temperature_jump: Annotated[Length, Limits(ge=0)] | None = None
+    temperature_jump: Distance | None = None
     temperature: Annotated[float, Unit("K"), Positive] | None = None
     emissivity: Annotated[float, Limits(gt=0, le=1)] | None = None
 
@@ -508,6 +509,8 @@ class SceneSections:
         output: What is written beside the tables of results.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     accuracy: Annotated[float, Limits(gt=0, lt=0.5)] | None = None
     surface: SurfaceSection
     counter_surface: CounterSurfaceSection | None = None
@@ -521,7 +524,7 @@ class SceneSections:
     wear: WearSection | None = None
     coupling: CouplingSection = field(default_factory=CouplingSection)
     reference: ReferenceSection = field(default_factory=ReferenceSection)
-    loading: LoadHistory = field(metadata={KEY: "load"})
+    loading: Annotated[LoadHistory, Field(alias="load")] = field(metadata={KEY: "load"})
     conductance: ConductanceSection | None = None
     leak: LeakSection | None = None
     vibration: VibrationSection | None = None
