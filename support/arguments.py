@@ -1,8 +1,8 @@
 """Checks arguments of public functions and fields of records against their annotations.
 
-What is annotated is what is checked: kinds, lengths of tuples, and `Limits`. Numbers and truth
-values of numpy become those of Python, real arrays `float64`, lists and arrays in the place of
-tuples tuples. Nothing is rounded, and no imaginary part, mask or unit is dropped.
+What is annotated is what is checked: kinds, lengths of tuples, and `Limits`. Truth values and whole
+numbers of numpy become those of Python, real numbers `float`, real arrays `float64`, lists and
+arrays in the place of tuples tuples. No imaginary part, mask or unit is dropped.
 
 Units and limits of the fields of records are stated once, where a field is declared. Whatever reads
 records from text, as scenes are read, finds them beside the types.
@@ -29,7 +29,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.support.checks import real_array
+from patchlaw.support.checks import LARGEST, SMALLEST, real_array
 from patchlaw.support.errors import InputError, shortened
 from patchlaw.support.quantities import Unit
 
@@ -79,12 +79,17 @@ Positive = Limits(gt=0)
 Length = Annotated[float, Unit("mm")]
 PositiveLength = Annotated[float, Unit("mm"), Positive]
 Distance = Annotated[float, Unit("mm", zero=True), Limits(ge=0)]
+Side = Annotated[float, Limits(ge=SMALLEST, le=LARGEST)]
+Lengths = tuple[Side, Side]
+"""Sides (Lx, Ly) of a rectangle [mm]."""
 Pressure = Annotated[float, Unit("MPa")]
 PositivePressure = Annotated[float, Unit("MPa"), Positive]
 Slope = Annotated[float, Unit("")]
 Density = Annotated[float, Unit("t/mm**3"), Positive]
 Mass = Annotated[float, Unit("t"), Positive]
 Count = Annotated[int, Limits(ge=1, le=1_000_000_000)]
+Grid = tuple[Count, Count]
+"""Numbers of cells or patches along x and y."""
 Tag = str | Annotated[int, Limits(ge=0)]
 """Physical name or number of a face in a mesh."""
 Heights = Annotated[int, Limits(ge=4, le=1_000_000_000)]
@@ -348,17 +353,14 @@ def _plain(value: Any) -> Any:
 
 
 def _number(value: Any, hint: Any, finite: bool) -> Any:
-    number = value
-    if type(value) is not float:
-        value = _plain(value)
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise _Refused("must be a number")
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        value = value if isinstance(value, int | float) else number
-    if finite and not math.isfinite(number):
+    value = _plain(value)
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise _Refused("must be a number")
+    try:
+        value = float(value)
+    except OverflowError:
+        value = math.inf
+    if finite and not math.isfinite(value):
         raise _Refused("must be a finite number")
     return value
 

@@ -15,7 +15,7 @@ from typing import Annotated, Literal, TypeAlias, get_args
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support import Array, Counts, Indices, InputError, cell_counts, positive_lengths
+from patchlaw.support import Array, Counts, Indices, InputError, Lengths
 from patchlaw.support.arguments import Count, Distance, Limits, PositiveLength, check_fields
 
 CellCounts: TypeAlias = tuple[int, int, int]
@@ -225,13 +225,11 @@ class BlockShape(BlockMeshing):
         InputError: When a value is out of its range.
     """
 
-    interface: tuple[float, float]
+    interface: Lengths
     height: PositiveLength
-    cells: tuple[int, int, int]
+    cells: tuple[Count, Count, Count]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
-        object.__setattr__(self, "cells", cell_counts(self.cells, "the block", dimension=3))
         check_fields(self)
         if self.element not in ELEMENTS:
             raise InputError(

@@ -52,7 +52,7 @@ def read(record: type[T], data: Any, unknown: Complain = _unknown) -> T:
         InputError: When anything is wrong: the first problem, with key, value and what is allowed.
     """
     try:
-        return cast(T, _validator(record).validate_python(data))
+        return cast(T, _validator(cast(Any, record)).validate_python(data))
     except ValidationError as error:
         raise _first_problem(error, unknown) from None
 

@@ -28,6 +28,7 @@ from patchlaw.support import (
     KEY,
     Count,
     Distance,
+    Grid,
     Heights,
     InputError,
     Length,
@@ -42,7 +43,6 @@ from patchlaw.support import (
 )
 from patchlaw.support.quantities import example
 
-Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
 
@@ -56,7 +56,7 @@ class PatchesSection:
             results by them.
     """
 
-    grid: Pair = (4, 4)
+    grid: Grid = (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
