@@ -21,7 +21,7 @@ import typing
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, fields
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
@@ -404,7 +404,8 @@ def _tuple(value: Any, hint: Any, finite: bool) -> Any:
     if not endless and len(value) != len(inner):
         raise _Refused(f"must be {_words(hint)}")
     hints = inner[:1] * len(value) if endless else inner
-    passed = tuple(_each(value, hints, hint, finite))
+    pairs = zip(value, hints, strict=True)
+    passed = tuple(_item(one, each, finite, partial(_words, hint)) for one, each in pairs)
     same = isinstance(value, tuple) and all(map(operator.is_, passed, value))
     return value if same else passed
 
@@ -416,25 +417,19 @@ def _items(value: Any, hint: Any, finite: bool) -> Any:
     kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
     if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
         raise _Refused(f"must be {_words(hint)}")
-    if not inner or not _words(inner[0]) or kind is abc.Iterable:
+    if not inner or kind is abc.Iterable:
         return value
-    passed = list(_each(value, inner * len(value), hint, finite))
+    passed = [_item(one, inner[0], finite, partial(_words, hint)) for one in value]
     return value if all(map(operator.is_, passed, value)) else passed
 
 
-def _each(values: Any, hints: tuple[Any, ...], whole: Any, finite: bool) -> Iterator[Any]:
-    """Yield what to pass on for the values in a list, each with an annotation."""
-    for one, hint in zip(values, hints, strict=True):
-        yield _item(one, hint, finite, whole)
-
-
-def _item(value: Any, hint: Any, finite: bool, whole: Any, words: str = "") -> Any:
-    """Return what to pass on for a value among others."""
+def _item(value: Any, hint: Any, finite: bool, whole: Callable[[], str]) -> Any:
+    """Return what to pass on for a value among others, of which errors give the words."""
     try:
         return _taken(value, hint, finite)
     except _Refused as refused:
         told = "" if _words(hint) in str(refused) else f"; {shortened(value)} {refused}"
-        raise _Refused(f"must be {words or _words(whole)}{told}") from None
+        raise _Refused(f"must be {whole()}{told}") from None
 
 
 def _mapping(value: Any, hint: Any, finite: bool) -> Any:
@@ -442,8 +437,8 @@ def _mapping(value: Any, hint: Any, finite: bool) -> Any:
         raise _Refused("must be a dictionary")
     key, item = get_args(hint) or (Any, Any)
     for name, one in value.items():
-        _item(name, key, finite, hint, f"a dictionary by {_words(key) or 'anything'}")
-        _item(one, item, finite, hint, f"a dictionary of {_words(item) or 'anything'}")
+        _item(name, key, finite, lambda: f"a dictionary by {_words(key)}")
+        _item(one, item, finite, lambda: f"a dictionary of {_words(item)}")
     return value
 
 

@@ -6,7 +6,6 @@ conducts, leaks, vibrates.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -114,25 +113,19 @@ class CouplingSection:
     table_tolerance: Annotated[float, Limits(gt=0, lt=0.1)] | None = None
 
     def __post_init__(self) -> None:
-        for statement, key, allowed in self._restrictions():
+        laws = {"isolated", "consistent"}
+        for key, default, kinds in (
+            ("love", "mean", {"isolated"}),
+            ("interface", "patchwise", laws),
+            ("table_tolerance", None, laws),
+        ):
             value = getattr(self, key)
-            if value not in allowed:
-                instead = " or ".join(repr(one) for one in allowed if one is not None)
+            # the analytic one ignores what is about patches and finite elements
+            if value != default and self.kind not in {*kinds, "analytic"}:
                 raise InputError(
-                    f"{key} = {value!r} does not go with {statement}",
-                    allowed=f"{key} = {instead}" if instead else "leave it out",
+                    f"{key} = {value!r} does not go with kind = '{self.kind}'",
+                    allowed=f"{key} = {default!r}" if default else "leave it out",
                 )
-
-    def _restrictions(self) -> Iterator[tuple[str, str, tuple[str | None, ...]]]:
-        """Yield a statement of this section, a key, and the values that the key may have then."""
-        if self.kind == "analytic":  # ignores what is about patches and finite elements
-            return
-        kind = f"kind = '{self.kind}'"
-        if self.kind != "isolated":
-            yield kind, "love", ("mean",)
-        if self.kind in ("concurrent", "reference"):  # which have no laws
-            yield kind, "interface", ("patchwise",)
-            yield kind, "table_tolerance", (None,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
