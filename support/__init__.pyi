@@ -48,6 +48,7 @@ from .errors import NotWritten as NotWritten
 from .errors import OutOfMemory as OutOfMemory
 from .errors import PatchlawError as PatchlawError
 from .errors import did_you_mean as did_you_mean
+from .errors import located as located
 from .parallel import BLOCK as BLOCK
 from .parallel import blas_threads as blas_threads
 from .parallel import blocks as blocks

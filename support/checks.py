@@ -34,7 +34,8 @@ def check_file(path: Path, file: str | None = None) -> None:
     """
     with reading(path, file):
         if not path.is_file():
-            problem = "is a folder" if path.is_dir() else "there is no such file"
+            problem = "is no regular file" if path.exists() else "there is no such file"
+            problem = "is a folder" if path.is_dir() else problem
             raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
         if not os.access(path, os.R_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))

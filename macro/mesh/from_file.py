@@ -24,7 +24,17 @@ from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides
 from patchlaw.macro.mesh.xdmf import read_xdmf
-from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals, check_file, on_root
+from patchlaw.support import (
+    Array,
+    Counts,
+    Flags,
+    Indices,
+    InputError,
+    Locals,
+    check_file,
+    located,
+    on_root,
+)
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""
@@ -211,13 +221,11 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
             allowed=".msh of gmsh, .xdmf of dolfinx",
         )
     on_root(comm, lambda: check_file(path, str(path)))
-    try:
+    with located(str(path)):
         tagged = reader(path, comm)
         tagged.mesh.geometry.x[:] *= unit
         check_cells(tagged)
         check_connected(tagged)
-    except InputError as error:
-        raise error.located(file=str(path)) from error
     return tagged
 
 

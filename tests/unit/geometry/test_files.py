@@ -298,7 +298,7 @@ def test_files_larger_than_memory_are_refused_unread(tmp_path, name, size):
 def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe.txt")
     for path in (tmp_path / "pipe.txt", "/dev/zero", "a\0.npy"):
-        with pytest.raises(InputError, match="there is no such file"):
+        with pytest.raises(InputError, match=r"is no regular file|there is no such file"):
             read_surface(path, lengths=(1.0, 1.0))
     with pytest.raises(InputError, match="cannot be read: File name too long"):
         read_surface(tmp_path / ("x" * 300), lengths=(1.0, 1.0))
