@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from patchlaw.support.errors import InputError
 
@@ -151,19 +151,17 @@ class Unit:
         zero: Whether 0 is allowed, which refusals then offer.
     """
 
-    __is_annotated_types_grouped_metadata__: ClassVar = True
-
     name: str
     several: bool = False
     pairs: bool = False
     zero: bool = False
 
-    def __iter__(self) -> Iterator[Any]:
-        """Yield what the unit stands for, as groups of annotated_types do."""
-        from pydantic import BeforeValidator, WithJsonSchema
+    def __get_pydantic_core_schema__(self, kind: Any, of: Callable[[Any], Any]) -> dict[str, Any]:
+        parsed = {"type": "no-info", "function": self.parsed}
+        return {"type": "function-before", "function": parsed, "schema": of(kind)}
 
-        yield BeforeValidator(self.parsed)
-        yield WithJsonSchema(self.schema)
+    def __get_pydantic_json_schema__(self, _: Any, of: Callable[[Any], Any]) -> dict[str, Any]:
+        return self.schema
 
     def parsed(self, value: Any) -> Any:
         """Return a number, or tuples of them, from what a user writes; see `parse_quantity`."""
