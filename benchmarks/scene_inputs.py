@@ -284,7 +284,9 @@ def planned(path, overrides=()):
         told = str(error)
         of_heights = str(error.key).endswith("surface.file")  # which names the file of heights
         assert str(path) in told or of_heights or (overrides and error.key is None), told
-        assert error.key or re.search("is not (valid TOML|UTF-8)|cannot be read|override", told)
+        assert error.key or re.search(
+            "is not (valid TOML|UTF-8)|cannot be read|no such file|override", told
+        )
         assert len(told) < 2000, told[:300]
         return "refused"
     except NotConverged:

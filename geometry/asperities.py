@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
-from patchlaw.support import Array, Flags, Indices, InputError, frozen_array, positive_lengths
+from patchlaw.support import Array, Flags, Indices, InputError, Lengths, check_fields, frozen_array
 
 _COINCIDENT = 1e-3
 """Distance of summits that are taken for one [cells]."""
@@ -213,7 +213,7 @@ class Asperities:
     radius_major: Array
     radius_minor: Array
     angle: Array
-    lengths: tuple[float, float]
+    lengths: Lengths
     highest: float
     mean_height: float
     border_x: Array = field(default_factory=lambda: np.empty(0))
@@ -223,7 +223,7 @@ class Asperities:
     flat: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the asperities"))
+        check_fields(self)
         for group in (_SUMMIT_ARRAYS, _BORDER_ARRAYS):
             arrays = {name: frozen_array(np.atleast_1d(getattr(self, name))) for name in group}
             sizes = {name: array.shape for name, array in arrays.items()}

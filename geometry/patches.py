@@ -9,8 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.surface import Surface
-from patchlaw.support import Array, Indices, InputError, check_fields, checked, did_you_mean
-from patchlaw.support.checks import cell_counts, finite_pair, positive_lengths
+from patchlaw.support import (
+    Array,
+    Grid,
+    Indices,
+    InputError,
+    Lengths,
+    check_fields,
+    checked,
+    did_you_mean,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,17 +35,12 @@ class PatchGrid:
             the origin not finite.
     """
 
-    grid: tuple[int, int]
-    lengths: tuple[float, float]
+    grid: Grid
+    lengths: Lengths
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "grid", cell_counts(self.grid, "the patch grid"))
-        object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the patch grid"))
-        problem = "the origin of the patch grid does not fit"
-        origin = finite_pair(self.origin, problem, allowed="two finite numbers in mm")
-        object.__setattr__(self, "origin", origin)
 
     @property
     def count(self) -> int:

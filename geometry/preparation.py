@@ -17,8 +17,8 @@ from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothe
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.statistics import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface
-from patchlaw.support import Array, Flags, Heights, InputError, Length, PositiveLength
-from patchlaw.support.checks import LARGEST, cell_counts, check_scale, is_level
+from patchlaw.support import Array, Flags, Heights, InputError, Length, PositiveLength, check_fields
+from patchlaw.support.checks import LARGEST, check_scale, is_level
 
 Interval = tuple[Length, Length]
 
@@ -96,6 +96,9 @@ class Preparation:
     filter: Filter = Filter()
     resample: tuple[Heights, Heights] | None = None
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+
 
 @dataclass(slots=True)
 class WorkingMap:
@@ -150,10 +153,11 @@ class WorkingMap:
     def resample(self, steps: Preparation) -> None:
         """Bring the heights to the grid that is wanted."""
         if steps.resample is not None:
-            mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
             nx, ny = self.heights.shape
             self.said.append(f"resampled from {nx} × {ny} heights")
-            self.heights = regridded(self.heights, self.lengths, (mx, my), periodic=self.periodic)
+            self.heights = regridded(
+                self.heights, self.lengths, steps.resample, periodic=self.periodic
+            )
 
 
 def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surface:

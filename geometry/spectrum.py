@@ -13,6 +13,8 @@ import scipy
 from patchlaw.geometry.surface import Surface
 from patchlaw.support import Array, Counts, Flags, InputError
 from patchlaw.support.arguments import (
+    Heights,
+    Lengths,
     Limits,
     Positive,
     PositiveLength,
@@ -21,7 +23,7 @@ from patchlaw.support.arguments import (
     check_fields,
     checked,
 )
-from patchlaw.support.checks import cell_counts, check_scale, finite_pair, positive_lengths
+from patchlaw.support.checks import check_scale
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""
@@ -83,7 +85,7 @@ class Spectrum:
                 allowed="waves, or waves_x and waves_y together",
             )
         for name in bands:
-            object.__setattr__(self, name, _checked_band(getattr(self, name), name))
+            _check_band(getattr(self, name), name)
         amplitudes = self._given(_AMPLITUDES)
         if len(amplitudes) != 1:
             raise InputError(
@@ -105,12 +107,10 @@ def _written(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)  # without rounding noise
 
 
-def _checked_band(band: Band, name: str) -> Band:
-    problem, allowed = "is not a band", "0 ≤ lo ≤ hi, waves per side"
-    lo, hi = finite_pair(band, problem, allowed=allowed, key=name)
-    if not 0.0 <= lo <= hi:
-        raise InputError(problem, key=name, value=band, allowed=allowed)
-    return lo, hi
+def _check_band(band: Band, name: str) -> None:
+    if not 0.0 <= band[0] <= band[1]:
+        allowed = "0 ≤ lo ≤ hi, waves per side"
+        raise InputError("is not a band", key=name, value=band, allowed=allowed)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -158,9 +158,7 @@ def random_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> Waves:
 
 
 @checked
-def synthesise(
-    spectrum: Spectrum, *, grid: tuple[int, int], lengths: tuple[float, float]
-) -> Surface:
+def synthesise(spectrum: Spectrum, *, grid: tuple[Heights, Heights], lengths: Lengths) -> Surface:
     """Synthesise a periodic random surface with uniformly distributed phases.
 
     Args:
@@ -176,8 +174,7 @@ def synthesise(
 
     Source: Waddad et al. 2016, section 1.1, doi 10.1016/j.triboint.2015.12.023.
     """
-    nx, ny = cell_counts(grid, "the grid of the surface", smallest=4)
-    lengths = positive_lengths(lengths, "the surface")
+    nx, ny = grid
     largest = _largest_waves(spectrum, lengths)
     _check_resolved((nx, ny), largest, per_wave=1)  # before waves are listed
     waves = random_waves(spectrum, lengths)

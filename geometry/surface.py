@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry.filters import levelled
 from patchlaw.geometry.interpolant import Interpolant, bordered, cell_centres
-from patchlaw.support import Array, Heights, Indices, InputError, check_fields, checked
-from patchlaw.support.checks import LARGEST, frozen_array, is_level, positive_lengths
+from patchlaw.support import Array, Heights, Indices, InputError, Lengths, check_fields, checked
+from patchlaw.support.checks import LARGEST, frozen_array, is_level
 from patchlaw.support.displayed import Displayed, Table
 
 
@@ -50,14 +50,13 @@ class Surface(Displayed):
     """How users make one, for errors."""
 
     heights: Array
-    lengths: tuple[float, float]
+    lengths: Lengths
     periodic: bool = False
     source: str = ""
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
-        object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
         object.__setattr__(self, "heights", _checked_heights(self.heights))
 
     def displayed(self) -> tuple[str, Table]:

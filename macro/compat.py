@@ -358,16 +358,6 @@ def reference_facets(cell_name: str) -> tuple[Array, Indices]:
     return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[-2], dtype=np.intp)
 
 
-def reference_entities(cell_name: str, dimension: int) -> list[list[int]]:
-    """Return the corners of the reference cell's vertices, edges, faces, or of itself.
-
-    Args:
-        cell_name: Name of the cell, such as ``hexahedron``.
-        dimension: That of the entities, 0 to 3.
-    """
-    return [list(each) for each in basix.topology(CELLS[cell_name])[dimension]]
-
-
 def triangle_rule(degree: int) -> tuple[Array, Array]:
     """Return points (n, 2) and weights (n,), of sum ½, exact to ``degree`` on the triangle."""
     points, weights = basix.make_quadrature(basix.CellType.triangle, degree)

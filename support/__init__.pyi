@@ -4,9 +4,12 @@ from .arguments import KEY as KEY
 from .arguments import Comm as Comm
 from .arguments import Count as Count
 from .arguments import Density as Density
+from .arguments import Distance as Distance
+from .arguments import Grid as Grid
 from .arguments import Has as Has
 from .arguments import Heights as Heights
 from .arguments import Length as Length
+from .arguments import Lengths as Lengths
 from .arguments import Limits as Limits
 from .arguments import Mass as Mass
 from .arguments import Positive as Positive
@@ -15,7 +18,6 @@ from .arguments import PositivePressure as PositivePressure
 from .arguments import Pressure as Pressure
 from .arguments import Slope as Slope
 from .arguments import Tag as Tag
-from .arguments import Unit as Unit
 from .arguments import changed_fields as changed_fields
 from .arguments import check_fields as check_fields
 from .arguments import checked as checked
@@ -30,14 +32,11 @@ from .arrays import cached_where_small as cached_where_small
 from .checks import LARGEST as LARGEST
 from .checks import PROGRAM as PROGRAM
 from .checks import address_space as address_space
-from .checks import cell_counts as cell_counts
 from .checks import check_file as check_file
 from .checks import check_scale as check_scale
-from .checks import finite_pair as finite_pair
 from .checks import frozen_array as frozen_array
 from .checks import is_level as is_level
 from .checks import physical_memory as physical_memory
-from .checks import positive_lengths as positive_lengths
 from .checks import process_memory as process_memory
 from .checks import reading as reading
 from .checks import real_array as real_array
@@ -49,6 +48,7 @@ from .errors import NotWritten as NotWritten
 from .errors import OutOfMemory as OutOfMemory
 from .errors import PatchlawError as PatchlawError
 from .errors import did_you_mean as did_you_mean
+from .errors import located as located
 from .parallel import BLOCK as BLOCK
 from .parallel import blas_threads as blas_threads
 from .parallel import blocks as blocks
@@ -63,3 +63,4 @@ from .parallel import on_rows as on_rows
 from .parallel import place_in as place_in
 from .parallel import shared as shared
 from .parallel import together as together
+from .quantities import Unit as Unit

@@ -1,8 +1,8 @@
 """Checks arguments of public functions and fields of records against their annotations.
 
-What is annotated is what is checked: kinds, lengths of tuples, and `Limits`. Numbers and truth
-values of numpy become those of Python, real arrays `float64`, lists and arrays in the place of
-tuples tuples. Nothing is rounded, and no imaginary part, mask or unit is dropped.
+What is annotated is what is checked: kinds, lengths of tuples, and `Limits`. Truth values and whole
+numbers of numpy become those of Python, real numbers `float`, real arrays `float64`, lists and
+arrays in the place of tuples tuples. No imaginary part, mask or unit is dropped.
 
 Units and limits of the fields of records are stated once, where a field is declared. Whatever reads
 records from text, as scenes are read, finds them beside the types.
@@ -21,34 +21,20 @@ import typing
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, fields
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.support.checks import real_array
+from patchlaw.support.checks import LARGEST, SMALLEST, real_array
 from patchlaw.support.errors import InputError, shortened
+from patchlaw.support.quantities import Unit
 
 KEY = "key"
 """Metadata of a dataclass's field: its name in scene files; None where it is no key of theirs."""
-
-
-@dataclass(frozen=True, slots=True)
-class Unit:
-    """Unit of a number, or of several.
-
-    Args:
-        name: The unit in pint's notation; empty for a ratio.
-        several: Whether the field holds a tuple, for which users may write one number or a list.
-        pairs: Whether it holds a tuple of pairs along x and y, for which users may write one pair.
-    """
-
-    name: str
-    several: bool = False
-    pairs: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +52,15 @@ class Limits:
     ge: float | None = None
     lt: float | None = None
     le: float | None = None
+    __is_annotated_types_grouped_metadata__: ClassVar = True
+
+    def __iter__(self) -> Iterator[Any]:
+        """Yield what this stands for beside a type that pydantic reads."""
+        import annotated_types
+
+        for name in ("gt", "ge", "lt", "le"):
+            if (bound := getattr(self, name)) is not None:
+                yield getattr(annotated_types, name.title())(bound)
 
     def problem(self, value: float) -> str:
         """Return what is wrong with a number, in pydantic's words; empty for nothing."""
@@ -83,12 +78,18 @@ class Limits:
 Positive = Limits(gt=0)
 Length = Annotated[float, Unit("mm")]
 PositiveLength = Annotated[float, Unit("mm"), Positive]
+Distance = Annotated[float, Unit("mm", zero=True), Limits(ge=0)]
+Side = Annotated[float, Limits(ge=SMALLEST, le=LARGEST)]
+Lengths = tuple[Side, Side]
+"""Sides (Lx, Ly) of a rectangle [mm]."""
 Pressure = Annotated[float, Unit("MPa")]
 PositivePressure = Annotated[float, Unit("MPa"), Positive]
 Slope = Annotated[float, Unit("")]
 Density = Annotated[float, Unit("t/mm**3"), Positive]
 Mass = Annotated[float, Unit("t"), Positive]
 Count = Annotated[int, Limits(ge=1, le=1_000_000_000)]
+Grid = tuple[Count, Count]
+"""Numbers of cells or patches along x and y."""
 Tag = str | Annotated[int, Limits(ge=0)]
 """Physical name or number of a face in a mesh."""
 Heights = Annotated[int, Limits(ge=4, le=1_000_000_000)]
@@ -352,17 +353,14 @@ def _plain(value: Any) -> Any:
 
 
 def _number(value: Any, hint: Any, finite: bool) -> Any:
-    number = value
-    if type(value) is not float:
-        value = _plain(value)
-        if isinstance(value, bool) or not isinstance(value, Real):
-            raise _Refused("must be a number")
-        try:
-            number = float(value)
-        except OverflowError:
-            number = math.inf
-        value = value if isinstance(value, int | float) else number
-    if finite and not math.isfinite(number):
+    value = _plain(value)
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise _Refused("must be a number")
+    try:
+        value = float(value)
+    except OverflowError:
+        value = math.inf
+    if finite and not math.isfinite(value):
         raise _Refused("must be a finite number")
     return value
 
@@ -406,7 +404,8 @@ def _tuple(value: Any, hint: Any, finite: bool) -> Any:
     if not endless and len(value) != len(inner):
         raise _Refused(f"must be {_words(hint)}")
     hints = inner[:1] * len(value) if endless else inner
-    passed = tuple(_each(value, hints, hint, finite))
+    pairs = zip(value, hints, strict=True)
+    passed = tuple(_item(one, each, finite, partial(_words, hint)) for one, each in pairs)
     same = isinstance(value, tuple) and all(map(operator.is_, passed, value))
     return value if same else passed
 
@@ -418,25 +417,19 @@ def _items(value: Any, hint: Any, finite: bool) -> Any:
     kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
     if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
         raise _Refused(f"must be {_words(hint)}")
-    if not inner or not _words(inner[0]) or kind is abc.Iterable:
+    if not inner or kind is abc.Iterable:
         return value
-    passed = list(_each(value, inner * len(value), hint, finite))
+    passed = [_item(one, inner[0], finite, partial(_words, hint)) for one in value]
     return value if all(map(operator.is_, passed, value)) else passed
 
 
-def _each(values: Any, hints: tuple[Any, ...], whole: Any, finite: bool) -> Iterator[Any]:
-    """Yield what to pass on for the values in a list, each with an annotation."""
-    for one, hint in zip(values, hints, strict=True):
-        yield _item(one, hint, finite, whole)
-
-
-def _item(value: Any, hint: Any, finite: bool, whole: Any, words: str = "") -> Any:
-    """Return what to pass on for a value among others."""
+def _item(value: Any, hint: Any, finite: bool, whole: Callable[[], str]) -> Any:
+    """Return what to pass on for a value among others, of which errors give the words."""
     try:
         return _taken(value, hint, finite)
     except _Refused as refused:
         told = "" if _words(hint) in str(refused) else f"; {shortened(value)} {refused}"
-        raise _Refused(f"must be {words or _words(whole)}{told}") from None
+        raise _Refused(f"must be {whole()}{told}") from None
 
 
 def _mapping(value: Any, hint: Any, finite: bool) -> Any:
@@ -444,8 +437,8 @@ def _mapping(value: Any, hint: Any, finite: bool) -> Any:
         raise _Refused("must be a dictionary")
     key, item = get_args(hint) or (Any, Any)
     for name, one in value.items():
-        _item(name, key, finite, hint, f"a dictionary by {_words(key) or 'anything'}")
-        _item(one, item, finite, hint, f"a dictionary of {_words(item) or 'anything'}")
+        _item(name, key, finite, lambda: f"a dictionary by {_words(key)}")
+        _item(one, item, finite, lambda: f"a dictionary of {_words(item)}")
     return value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,8 @@ def check_file(path: Path, file: str | None = None) -> None:
     """
     with reading(path, file):
         if not path.is_file():
-            problem = "is a folder" if path.is_dir() else "there is no such file"
+            problem = "is no regular file" if path.exists() else "there is no such file"
+            problem = "is a folder" if path.is_dir() else problem
             raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
         if not os.access(path, os.R_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -56,23 +57,6 @@ def reading(path: Path, file: str | None = None) -> Iterator[None]:
     except OSError as error:
         name = file or str(error.filename or path)
         raise InputError(f"cannot be read: {error.strerror or error}", file=name) from None
-
-
-def positive_lengths(value: Any, what: str) -> tuple[float, float]:
-    """Return two positive, finite side lengths as floats.
-
-    Args:
-        value: Candidate for (Lx, Ly) [mm].
-        what: What the lengths belong to, such as ``"the surface"``.
-
-    Raises:
-        InputError: When there are not two of them, or one is not positive or out of range.
-    """
-    problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
-    pair = finite_pair(value, problem, allowed=allowed)
-    if not SMALLEST <= min(pair) <= max(pair) <= LARGEST:
-        raise InputError(problem, value=pair, allowed=allowed)
-    return pair
 
 
 def is_level(heights: Array, among: Array | None = None) -> bool:
@@ -112,30 +96,6 @@ def check_scale(heights: Array) -> None:
         )
 
 
-def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1) -> tuple[int, ...]:
-    """Return whole numbers of cells per direction as a tuple of int.
-
-    Args:
-        value: Candidate for the numbers of cells.
-        what: What is counted, such as ``"the patch grid"``.
-        dimension: How many numbers are expected.
-        smallest: Least number allowed in every direction.
-
-    Raises:
-        InputError: When their number, type or size is wrong.
-    """
-    several = isinstance(value, Sequence | np.ndarray)
-    counts = tuple(value) if several else ()
-    whole = all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in counts)
-    if len(counts) != dimension or not whole or min(counts) < smallest:
-        raise InputError(
-            f"{what} does not fit",
-            value=counts if several else value,
-            allowed=f"{dimension} whole numbers, each at least {smallest}",
-        )
-    return tuple(int(n) for n in counts)
-
-
 def real_array(value: Any) -> Array:
     """Return real numbers in double precision; what is masked becomes not a number.
 
@@ -170,29 +130,6 @@ def frozen_array(value: Any) -> Array:
     array = np.array(real_array(value), order="C")
     array.setflags(write=False)
     return array
-
-
-def finite_pair(
-    value: Any, problem: str, *, allowed: str, key: str | None = None
-) -> tuple[float, float]:
-    """Return two finite numbers as floats.
-
-    Args:
-        value: Candidate for the pair.
-        problem: What to say when it is none.
-        allowed: What would be accepted.
-        key: Name of what the pair is given for.
-
-    Raises:
-        InputError: When there are not two of them, or one is not finite.
-    """
-    try:
-        first, second = (float(part) for part in value)
-    except (TypeError, ValueError):
-        first = second = math.nan
-    if not (math.isfinite(first) and math.isfinite(second)):
-        raise InputError(problem, value=value, allowed=allowed, key=key)
-    return first, second
 
 
 def address_space() -> float:

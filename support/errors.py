@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import re
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum
 from typing import Any, Self
 
@@ -79,6 +80,28 @@ class InputError(PatchlawError, ValueError):
         subject = " = ".join(part for part in (key, shown) if part)
         text = ": ".join(part for part in (self.file, subject, self.problem) if part)
         return f"{text} (allowed: {self.allowed})" if self.allowed else text
+
+
+@contextmanager
+def located(
+    file: str | None = None, key: str | None = None, *, unreadable: str = ""
+) -> Iterator[None]:
+    """Give errors of the input that occur meanwhile a file and a key, where they have none.
+
+    Args:
+        file: The file.
+        key: The key.
+        unreadable: What to say of errors of all other families, which libraries that read files
+            raise; these stay what they are when it is not given.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise error.located(key=key, file=file) from None
+    except Exception as error:
+        if not unreadable:
+            raise
+        raise InputError(f"{unreadable}: {error}", key=key, file=file) from None
 
 
 class NotInstalled(PatchlawError, ImportError):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
 from patchlaw.support.errors import InputError
 
 
-class _Unit(NamedTuple):
+class _Target(NamedTuple):
     """A target unit: an example of a quantity, sizes that make sense, and its common spellings."""
 
     example: str
@@ -19,24 +21,24 @@ class _Unit(NamedTuple):
 
 
 _UNITS = {
-    "mm": _Unit('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3}),
-    "MPa": _Unit(
+    "mm": _Target('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3}),
+    "MPa": _Target(
         '"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3, "bar": 0.1}
     ),
-    "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
-    "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
-    "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6}),
-    "W/m/K": _Unit('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
-    "ohm*m": _Unit('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
-    "Pa*s": _Unit('"1 mPa s"', (1e-9, 1e9), {"Pa s": 1.0, "mPa s": 1e-3}),
-    "1/MPa": _Unit('"1e-8 mm^2/N"', (1e-30, 1e6)),
-    "m/s": _Unit('"5 m/s"', (1e-15, 1e9), {"m/s": 1.0, "mm/s": 1e-3}),
-    "K": _Unit('"300 K"', (1e-9, 1e9), {"K": 1.0}),
-    "1/K": _Unit('"12e-6 1/K"', (1e-12, 1.0), {"ppm/K": 1e-6, "um/m/K": 1e-6}),
-    "t/mm**3": _Unit('"7850 kg/m^3"', (1e-15, 1e-6)),
-    "t": _Unit('"2 kg"', (1e-15, 1e9), {"kg": 1e-3, "g": 1e-6, "t": 1.0}),
-    "deg": _Unit('"90 deg"', (1e-9, 1e6), {"deg": 1.0}),
-    "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}),
+    "mm**4": _Target('"1e-9 mm^4"', (1e-60, 1e60)),
+    "": _Target('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
+    "N": _Target('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6}),
+    "W/m/K": _Target('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
+    "ohm*m": _Target('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
+    "Pa*s": _Target('"1 mPa s"', (1e-9, 1e9), {"Pa s": 1.0, "mPa s": 1e-3}),
+    "1/MPa": _Target('"1e-8 mm^2/N"', (1e-30, 1e6)),
+    "m/s": _Target('"5 m/s"', (1e-15, 1e9), {"m/s": 1.0, "mm/s": 1e-3}),
+    "K": _Target('"300 K"', (1e-9, 1e9), {"K": 1.0}),
+    "1/K": _Target('"12e-6 1/K"', (1e-12, 1.0), {"ppm/K": 1e-6, "um/m/K": 1e-6}),
+    "t/mm**3": _Target('"7850 kg/m^3"', (1e-15, 1e-6)),
+    "t": _Target('"2 kg"', (1e-15, 1e9), {"kg": 1e-3, "g": 1e-6, "t": 1.0}),
+    "deg": _Target('"90 deg"', (1e-9, 1e6), {"deg": 1.0}),
+    "s": _Target('"55 min"', (1e-3, 1e12), {"s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}),
 }
 """Target units in pint's notation; an empty one is a ratio.
 
@@ -126,7 +128,7 @@ def _with_unit(text: str, unit: str) -> float:
     return number
 
 
-def _correction(text: str, target: _Unit) -> str:
+def _correction(text: str, target: _Target) -> str:
     """Return a question where a unit has letters of the wrong case, or a number a decimal comma."""
     number = re.match(r"[\s\d.,+-]*(?:[eE][+-]?\d+)?", text)[0].strip()  # type: ignore[index]
     unit = text.strip()[len(number) :].strip()
@@ -136,6 +138,58 @@ def _correction(text: str, target: _Unit) -> str:
     if right == f"{number} {unit}" or re.search(r",\d{3}$", number):  # which may mark thousands
         return ""
     return f"; did you mean '{right.strip()}'?"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Unit of a number, or of several, beside its type; pydantic reads quantities for it.
+
+    Args:
+        name: The unit in pint's notation; empty for a ratio.
+        several: Whether the field holds a tuple, for which users may write one number or a list.
+        pairs: Whether it holds a tuple of pairs along x and y, for which users may write one pair.
+        zero: Whether 0 is allowed, which refusals then offer.
+    """
+
+    name: str
+    several: bool = False
+    pairs: bool = False
+    zero: bool = False
+
+    def __get_pydantic_core_schema__(self, kind: Any, of: Callable[[Any], Any]) -> dict[str, Any]:
+        parsed = {"type": "no-info", "function": self.parsed}
+        return {"type": "function-before", "function": parsed, "schema": of(kind)}
+
+    def __get_pydantic_json_schema__(self, _: Any, of: Callable[[Any], Any]) -> dict[str, Any]:
+        return self.schema
+
+    def parsed(self, value: Any) -> Any:
+        """Return a number, or tuples of them, from what a user writes; see `parse_quantity`."""
+        if not (self.several or self.pairs):
+            return parse_quantity(value, self.name, zero=self.zero)
+        listed = value if isinstance(value, list | tuple) else [value]
+        if self.several:
+            return tuple(parse_quantity(one, self.name) for one in listed)
+        pairs = listed if listed and isinstance(listed[0], list | tuple) else [listed]
+        if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
+            shown = example(self.name)
+            allowed = f"[{shown}, {shown}], or a list of such pairs"
+            raise InputError("is no pair of quantities along x and y", allowed=allowed)
+        return tuple(tuple(parse_quantity(one, self.name) for one in pair) for pair in pairs)
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The JSON Schema of what a user writes, which editors know."""
+        one = {
+            "anyOf": [{"type": "number"}, {"type": "string"}],
+            "description": f"string with a unit, or a bare number in {named(self.name)}",
+            "unit": self.name,
+            "examples": [example(self.name).strip('"')],
+        }
+        pair = {"type": "array", "items": one, "minItems": 2, "maxItems": 2}
+        each = pair if self.pairs else one
+        listed = {"anyOf": [each, {"type": "array", "items": each, "minItems": 1}]}
+        return listed if self.several or self.pairs else one
 
 
 def parse_duration(text: str) -> float:

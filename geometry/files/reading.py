@@ -30,11 +30,9 @@ from patchlaw.geometry.files.text import load_text, read_text
 from patchlaw.geometry.preparation import Preparation, WorkingMap, prepared_map
 from patchlaw.geometry.statistics import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.surface import Surface
-from patchlaw.support import InputError, checked
+from patchlaw.support import Grid, InputError, Lengths, checked
 from patchlaw.support.checks import (
-    cell_counts,
     check_file,
-    positive_lengths,
     reading,
     real_array,
 )
@@ -198,8 +196,8 @@ def _channel(reader: Any, wanted: str | int | None) -> Any:
 def read_surface(
     path: str | os.PathLike[str],
     *,
-    lengths: tuple[float, float] | None = None,
-    grid: tuple[int, int] | None = None,
+    lengths: Lengths | None = None,
+    grid: Grid | None = None,
     height_unit: str | None = None,
     xy_unit: str | None = None,
     channel: str | int | None = None,
@@ -324,14 +322,14 @@ def _laid_out(
             "given, override those of the file",
         )
     shape = content.heights.shape
-    if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
-        hint = "; swap_xy = true exchanges x and y" if shape == asked[::-1] else ""
+    if grid is not None and shape != grid:
+        hint = "; swap_xy = true exchanges x and y" if shape == grid[::-1] else ""
         raise InputError(
             f"the file's number of heights differs from the grid that was asked for{hint}",
             value=shape,
-            allowed=f"{asked}",
+            allowed=f"{grid}",
         )
-    sides, stated = positive_lengths(sides, "the surface"), content.lengths
+    stated = content.lengths
     if stated and not content.of_points and not np.allclose(sides, stated, rtol=0.05, atol=0.0):
         note = (
             "the file states sides of {:.4g} × {:.4g} mm, and lengths of {:.4g} × {:.4g} mm are "
@@ -341,10 +339,11 @@ def _laid_out(
     return content, sides
 
 
+@checked
 def _surface(
     name: str,
     content: FileContent,
-    sides: tuple[float, float],
+    sides: Lengths,
     unit: str,
     steps: Preparation,
     periodic: bool,

@@ -15,8 +15,8 @@ from typing import Annotated, Literal, TypeAlias, get_args
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support import Array, Counts, Indices, InputError, cell_counts, positive_lengths
-from patchlaw.support.arguments import Count, Length, Limits, PositiveLength, check_fields
+from patchlaw.support import Array, Counts, Indices, InputError, Lengths
+from patchlaw.support.arguments import Count, Distance, Limits, PositiveLength, check_fields
 
 CellCounts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]
@@ -205,7 +205,7 @@ class BlockMeshing:
 
     element: str = "Q1"
     grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
-    margin: Annotated[Length, Limits(ge=0)] = 0.0
+    margin: Distance = 0.0
     margin_cells: Count = 8
     margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
 
@@ -225,13 +225,11 @@ class BlockShape(BlockMeshing):
         InputError: When a value is out of its range.
     """
 
-    interface: tuple[float, float]
+    interface: Lengths
     height: PositiveLength
-    cells: tuple[int, int, int]
+    cells: tuple[Count, Count, Count]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
-        object.__setattr__(self, "cells", cell_counts(self.cells, "the block", dimension=3))
         check_fields(self)
         if self.element not in ELEMENTS:
             raise InputError(

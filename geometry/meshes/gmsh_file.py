@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.msh_sections import KINDS, MshContent, msh_content
-from patchlaw.support import Array, Counts, InputError, Locals, reading
+from patchlaw.support import Array, Counts, InputError, Locals, located, reading
 
 Table = Counts
 
@@ -80,12 +80,10 @@ def read_gmsh_file(path: Path) -> MeshArrays:
         InputError: When it is no such file, or holds no mesh of tetrahedra or hexahedra alone, or
             when a volume or a surface has two groups.
     """
-    try:
+    with located(str(path)):
         with reading(path):
             content = path.read_bytes()
         return _arrays(msh_content(content))
-    except InputError as error:
-        raise error.located(file=str(path)) from error
 
 
 def _arrays(content: MshContent) -> MeshArrays:

@@ -27,7 +27,7 @@ from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexah
 from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
-from patchlaw.support import Array, InputError, positive_lengths
+from patchlaw.support import Array, InputError, Lengths
 from patchlaw.support.arguments import Count, Positive, PositiveLength, check_fields, checked
 
 _LONGEST = 1.75
@@ -59,7 +59,7 @@ class RefinedShape:
         InputError: When a value is out of its range.
     """
 
-    interface: tuple[float, float]
+    interface: Lengths
     height: PositiveLength
     places: Array
     fine: PositiveLength
@@ -70,7 +70,6 @@ class RefinedShape:
     margin: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
         check_fields(self)
         if self.element not in ("P1", "P2"):
             raise InputError("this element is unknown", value=self.element, allowed="P1, P2")

@@ -29,7 +29,7 @@ from patchlaw.macro.mesh.tagged import (
     named_groups,
     planar_face,
 )
-from patchlaw.support import Array, InputError, Locals, together
+from patchlaw.support import Array, InputError, Locals, located, together
 
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""
@@ -136,7 +136,7 @@ class MarkedFaces(NamedTuple):
         mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
         if isinstance(tag, np.ndarray | np.generic) and not tag.ndim:
             tag = tag.item()  # a number, not the facet with this number
-        try:
+        with located(key=key):
             if isinstance(tag, str | int) and not isinstance(tag, bool):
                 if tags is None:
                     raise InputError("names a face without facet tags", value=tag, allowed="facets")
@@ -152,8 +152,6 @@ class MarkedFaces(NamedTuple):
             else:
                 given = together(mesh.comm, lambda: facet_indices(mesh, tag))
                 name = _BY_FACETS
-        except InputError as error:
-            raise error.located(key=key) from None
         return on_all_ranks(mesh, given), name
 
     def _placed(
@@ -198,10 +196,8 @@ class MarkedFaces(NamedTuple):
         """
         facets, name = self.find(tag, "opposite")
         tagged = TaggedMesh(mesh=self.mesh, facet_tags=_marked(self.mesh, facets))
-        try:
+        with located(key="opposite"):  # no facets, some inside the body, or a curved face
             plane = planar_face(tagged, 1, name=name)
-        except InputError as error:  # of no facets, of some inside the body, of a curved face
-            raise error.located(key="opposite") from None
         if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
             raise InputError(
                 "the faces are not parallel and opposite",

@@ -12,7 +12,8 @@ three classes however often they are refined (Bey, Computing 55 (1995), 355-378,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,19 @@ import numpy as np
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
-from patchlaw.macro.mesh.joined import numbers_one_after_the_other
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides
 from patchlaw.macro.mesh.xdmf import read_xdmf
-from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals, check_file, on_root
+from patchlaw.support import (
+    Array,
+    Counts,
+    Flags,
+    Indices,
+    InputError,
+    Locals,
+    check_file,
+    located,
+    on_root,
+)
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""
@@ -211,13 +221,11 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
             allowed=".msh of gmsh, .xdmf of dolfinx",
         )
     on_root(comm, lambda: check_file(path, str(path)))
-    try:
+    with located(str(path)):
         tagged = reader(path, comm)
         tagged.mesh.geometry.x[:] *= unit
         check_cells(tagged)
         check_connected(tagged)
-    except InputError as error:
-        raise error.located(file=str(path)) from error
     return tagged
 
 
@@ -242,32 +250,43 @@ def _from_gmsh(path: Path, comm: Any) -> TaggedMesh:
     )
 
 
-_TETRAHEDRON = [
-    ["0", "01", "02", "03"], ["01", "1", "12", "13"], ["02", "12", "2", "23"],
-    ["03", "13", "23", "3"], ["01", "02", "03", "13"], ["01", "02", "12", "13"],
-    ["02", "03", "13", "23"], ["02", "12", "13", "23"],
+_TETRAHEDRA = [
+    "00 01 02 03", "01 11 12 13", "02 12 22 23", "03 13 23 33",
+    "01 02 03 13", "01 02 12 13", "02 03 13 23", "02 12 13 23",
 ]  # fmt: skip
-_TRIANGLE = [["0", "01", "02"], ["01", "1", "12"], ["02", "12", "2"], ["01", "12", "02"]]
-_QUADRILATERAL = [
-    ["0", "01", "02", "0123"], ["01", "1", "0123", "13"],
-    ["02", "0123", "2", "23"], ["0123", "13", "23", "3"],
-]  # fmt: skip
+"""Parts of a tetrahedron: pairs of its corners that the corners of the parts lie half-way between.
+"""
 
 
-def _hexahedron() -> list[list[str]]:
-    """Return the nodes of the eight parts, named by the corners of the cell between which they lie.
+@cache
+def _parts(cell_name: str) -> tuple[Indices, list[Indices]]:
+    """Return how a cell, and every side of it, is cut, by its nodes of second order.
 
-    Corner i + 2 j + 4 k lies at (i, j, k) of the unit cube.
+    Args:
+        cell_name: Name of the cell, such as ``hexahedron``.
+
+    Returns:
+        Corners of the parts, shape (8, 4 or 8), and of each side those of its parts, shape (4, 3 or
+        4).
     """
-
-    def name(place: Any) -> str:
-        chosen = [[0] if at == 0 else [1] if at == 2 else [0, 1] for at in place]
-        return "".join(
-            str(i + 2 * j + 4 * k) for k in chosen[2] for j in chosen[1] for i in chosen[0]
-        )
-
-    corners = [(i, j, k) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
-    return [[name(np.add(part, corner)) for corner in corners] for part in corners]
+    nodes, (corners, sides) = (
+        compat.lagrange_points(cell_name, 2),
+        compat.reference_facets(cell_name),
+    )
+    if cell_name == "tetrahedron":
+        pairs = np.array([[tuple(map(int, one)) for one in part.split()] for part in _TETRAHEDRA])
+        places = corners[pairs].mean(axis=2)
+    else:
+        places = 0.5 * (corners[:, None] + corners)
+    apart = np.linalg.norm(places[:, :, None] - nodes, axis=3)
+    parts = apart.argmin(axis=2)
+    on_sides = [
+        {int(np.linalg.norm(nodes - 0.5 * (a + b), axis=1).argmin()) for a in ends for b in ends}
+        for ends in corners[sides]
+    ]
+    facets = parts[:, sides].reshape(-1, sides.shape[1])
+    cut = [np.array([one for one in facets if nodes_there >= {*one}]) for nodes_there in on_sides]
+    return parts, cut
 
 
 def refined(tagged: TaggedMesh, times: int = 1, *, key: str | None = None) -> TaggedMesh:
@@ -298,93 +317,25 @@ def refined(tagged: TaggedMesh, times: int = 1, *, key: str | None = None) -> Ta
 
 def _refined_once(tagged: TaggedMesh) -> TaggedMesh:
     mesh, comm = tagged.mesh, tagged.comm
-    parts = _TETRAHEDRON if mesh.topology.cell_name() == "tetrahedron" else _hexahedron()
-    lattice = _Nodes.of(mesh)
-    cells = lattice.of_cells(parts)
-    new = compat.mesh_from_cells(cells, lattice.points, None, comm)
-    facets, tags = _cut_facets(tagged, lattice)
+    parts, sides = _parts(mesh.topology.cell_name())
+    # quadratic functions have a node wherever a part has a corner
+    space, count = compat.scalar_space(mesh, 2), mesh.topology.index_map(3).size_local
+    numbers, nodes = space.dofmap.index_map, compat.cell_nodes(space)[:count]
+    own = numbers.local_to_global(nodes.ravel()).reshape(nodes.shape)
+    points = space.tabulate_dof_coordinates()[: numbers.size_local]
+    new = compat.mesh_from_cells(own[:, parts].reshape(-1, parts.shape[1]), points, None, comm)
+    facets, tags = [], []
+    for cut, (_, here, tag_of) in zip(sides, marked_sides(tagged), strict=True):
+        facets.append(own[here][:, cut].reshape(-1, cut.shape[1]))
+        tags.append(np.repeat(tag_of, len(cut)))
+    whole = [np.concatenate(comm.allgather(np.concatenate(one))) for one in (facets, tags)]
     of_cells = None
     if tagged.cell_tags is not None:
-        own = np.asarray(tagged.cell_tags.values)[: len(lattice.own)]
-        of_cells = cell_tags(new, np.concatenate(comm.allgather(np.repeat(own, len(parts)))))
-    return TaggedMesh(
+        own_tags = np.asarray(tagged.cell_tags.values)[:count]
+        of_cells = cell_tags(new, np.concatenate(comm.allgather(np.repeat(own_tags, len(parts)))))
+    return replace(
+        tagged,
         mesh=new,
-        facet_tags=facet_tags(
-            new,
-            np.concatenate(comm.allgather(facets)),
-            np.concatenate(comm.allgather(tags)),
-            dict(tagged.facet_names),
-        ),
+        facet_tags=facet_tags(new, whole[0], whole[1], dict(tagged.facet_names)),
         cell_tags=of_cells,
-        facet_names=tagged.facet_names,
-        cell_names=tagged.cell_names,
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Nodes:
-    """Table of the nodes of the refined mesh, consecutive on every rank.
-
-    Attributes:
-        own: By cell of this rank its nodes, corners before the middles of edges, of faces and of
-            the cell, shape (cells, nodes of a cell).
-        column: Column of `own` by the corners between which a node lies, such as ``"02"``.
-        points: This rank's nodes, shape (n, 3) [mm].
-    """
-
-    own: Table
-    column: dict[str, int]
-    points: Array
-
-    @classmethod
-    def of(cls, mesh: Any) -> _Nodes:
-        """Number the nodes; collective."""
-        topology, comm = mesh.topology, mesh.comm
-        dimensions = (0, 1) if topology.cell_name() == "tetrahedron" else (0, 1, 2, 3)
-        tables, maps = [], []
-        for dimension in dimensions:
-            topology.create_entities(dimension)
-            topology.create_connectivity(3, dimension)
-            corners = compat.reference_entities(topology.cell_name(), dimension)
-            if dimension == 0:  # of the geometry, whose nodes are the vertices
-                tables.append((corners, compat.cell_vertices(mesh)))
-                maps.append(mesh.geometry.index_map())
-            elif dimension == 3:
-                tables.append((corners, np.arange(len(tables[0][1]))[:, None]))
-                maps.append(topology.index_map(3))
-            else:
-                entities = topology.connectivity(3, dimension).array.reshape(-1, len(corners))
-                tables.append((corners, entities))
-                maps.append(topology.index_map(dimension))
-        vertices, count = compat.cell_vertices(mesh), topology.index_map(3).size_local
-        own, points, column = [], [], dict[str, int]()
-        numbers = numbers_one_after_the_other(maps, comm)
-        for (corners, entities), index_map, number in zip(tables, maps, numbers, strict=True):
-            own.append(number[entities[:count]])
-            middle = np.empty((len(number), 3))
-            for place, between in enumerate(corners):
-                middle[entities[:, place]] = mesh.geometry.x[vertices[:, between]].mean(axis=1)
-                column["".join(map(str, sorted(between)))] = len(column)
-            points.append(middle[: index_map.size_local])
-        return cls(own=np.hstack(own), column=column, points=np.concatenate(points))
-
-    def of_cells(self, parts: list[list[str]]) -> Table:
-        """Return the cells that this rank's cells are cut into, shape (n, 4 or 8)."""
-        columns = [[self.column[name] for name in part] for part in parts]
-        return self.own[:, columns].reshape(-1, len(parts[0]))
-
-
-def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, Locals]:
-    """Return the facets that marked ones of this rank's cells are cut into, and their tags."""
-    found, tags = [], []
-    for corners, here, tag_of in marked_sides(tagged):
-        parts = _TRIANGLE if len(corners) == 3 else _QUADRILATERAL
-        columns = [[nodes.column[_on(corners, name)] for name in part] for part in parts]
-        found.append(nodes.own[here][:, columns].reshape(-1, len(corners)))
-        tags.append(np.repeat(tag_of, len(parts)))
-    return np.concatenate(found), np.concatenate(tags)
-
-
-def _on(corners: Indices, name: str) -> str:
-    """Return the name in a cell of a node of one of its facets."""
-    return "".join(sorted(str(corners[int(digit)]) for digit in name))

@@ -21,7 +21,7 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means, mode_values, modes_within
 from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
 from patchlaw.micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
-from patchlaw.support import Array, Indices, InputError, blocks, positive_lengths
+from patchlaw.support import Array, Indices, InputError, Lengths, blocks, check_fields
 
 _ROWS = 256
 """Rows of a matrix that are made at a time."""
@@ -48,7 +48,7 @@ class FaceModes:
 
     directions: ClassVar[tuple[int, ...]] = ()
 
-    lengths: tuple[float, float]
+    lengths: Lengths
     matrix: Array
     origin: tuple[float, float] = (0.0, 0.0)
     rough: Array | None = None
@@ -56,7 +56,7 @@ class FaceModes:
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
         object.__setattr__(self, "matrix", matrix)
-        positive_lengths(self.lengths, "the top")
+        check_fields(self)
         count = round(matrix.shape[-1] ** 0.5) if matrix.ndim else 0
         if not count or matrix.shape != (*self.directions, count**2, count**2):
             shape = ", ".join([*map(str, self.directions), "K²", "K²"])

@@ -47,7 +47,7 @@ from patchlaw.micro.boundary_elements.rectangle_modes import (
     half_space_modes,
     half_space_stress_modes,
 )
-from patchlaw.support import Array, Indices, positive_lengths
+from patchlaw.support import Array, Indices, Lengths, check_fields
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
@@ -71,14 +71,14 @@ class RectangleFields:
         InputError: When a length is not positive.
     """
 
-    lengths: tuple[float, float]
+    lengths: Lengths
     count: int
     material: Material
     extended: Sides = (False, False, False, False)
     axis: int = 2
 
     def __post_init__(self) -> None:
-        positive_lengths(self.lengths, "the rectangle")
+        check_fields(self)
 
     def __call__(self, points: Array) -> tuple[Array, Array]:
         """Return displacements and stresses at points.

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -37,8 +37,7 @@ from patchlaw.micro import (
 from patchlaw.support import Array, InputError, process_memory
 from patchlaw.support.arguments import (
     Comm,
-    Length,
-    Limits,
+    Distance,
     PositiveLength,
     check_fields,
     checked,
@@ -414,7 +413,7 @@ class ElasticBlock:
     _: KW_ONLY
     height: PositiveLength
     sides: Literal["free", "roller"] = "free"
-    margin: Annotated[Length, Limits(ge=0)] = 0.0
+    margin: Distance = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -19,8 +19,7 @@ from patchlaw.multiscale.scene.body_sections import CounterBodySection
 from patchlaw.multiscale.scene.loads import body_states
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene, content_digest
-from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support import InputError, on_root
+from patchlaw.support import InputError, located, on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import ContactFacets, Loads, MeshedBody, TaggedMesh
@@ -161,10 +160,8 @@ class _Reader:
             regions: Names or numbers of further faces in the plane of the contact face.
             opposite: Frame of the face of a first body, which this one lies opposite to.
         """
-        try:
+        with located(self._scene.file, f"{self._key}.mesh"):
             return self._read(regions, opposite)
-        except InputError as error:
-            raise error.located(key=f"{self._key}.mesh", file=self._scene.file) from None
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
         from patchlaw.macro import contact_facets
@@ -205,7 +202,7 @@ class _Reader:
             )
             for one in section.supports
         ]
-        with located(self._scene, f"{key}.supports"):
+        with located(self._scene.file, f"{key}.supports"):
             for tag in contact:
                 check_supports(mesh, supports, tag)
         states = body_states(self._scene, key)
@@ -214,7 +211,7 @@ class _Reader:
             keys = [self._key_of("tractions", load.surface) for load in state.tractions]
             keys += [self._key_of("pretension", bolt.surface) for bolt in state.pretension]
             for where, load in zip(keys, one.on_surfaces, strict=True):
-                with located(self._scene, where):
+                with located(self._scene.file, where):
                     for tag in contact:
                         check_loads(mesh, supports, [load], tag)
         x, y, z = map(float, frame.normal)
@@ -304,7 +301,7 @@ class _Reader:
         allowed = 5e-3 * self._shortest(mesh) if curved else 0.0
         along = getattr(self._section, "first_axis", None)
         key = f"{self._key}.contact"
-        with located(self._scene, f"{self._key}.first_axis"):
+        with located(self._scene.file, f"{self._key}.first_axis"):
             faces = [
                 planar_face(mesh, tag, deviation=allowed, along=along, key=key) for tag in tags
             ]

@@ -24,7 +24,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
-from patchlaw.support import Array, Indices, InputError, check_fields, check_file, checked
+from patchlaw.support import Array, Indices, InputError, check_fields, check_file, checked, located
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.files import check_hdf5, hdf5_bytes, write_bytes
 from patchlaw.support.packages import optional_packages
@@ -457,17 +457,13 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
     name = str(path) if isinstance(path, Path) else None
     if isinstance(path, Path):
         check_file(path, name)
-    try:
+    with located(name, unreadable="is not a readable law file"):
         content = path.read_bytes() if isinstance(path, Path) else path.read()
         check_hdf5(content)
         with h5py.File(BytesIO(content), "r") as file:
             if file.attrs.get("format") != FORMAT:
-                raise InputError("is not a law file of patchlaw", file=name)
+                raise InputError("is not a law file of patchlaw")
             return _table(file)
-    except InputError as error:
-        raise error.located(file=name) from None
-    except Exception as error:  # h5py raises errors of many families
-        raise InputError(f"is not a readable law file: {error}", file=name) from None
 
 
 def _partition(file: Any) -> PatchGrid | Regions:

@@ -24,7 +24,16 @@ from patchlaw.multiscale.loading.path import (
     check_sliding,
     stated_shears,
 )
-from patchlaw.support import Array, InputError, Limits, Slope, Unit, changed_fields, check_fields
+from patchlaw.support import (
+    Array,
+    InputError,
+    Limits,
+    Slope,
+    Unit,
+    changed_fields,
+    check_fields,
+    located,
+)
 from patchlaw.support.quantities import example
 
 _MOST_STEPS = 10_000_000
@@ -93,10 +102,8 @@ class LoadHistory:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        try:
+        with located(key="zero"):
             object.__setattr__(self, "zero", Zero(self.zero).name)
-        except InputError as error:
-            raise error.located(key="zero") from None
         for key, (unit, _, from_zero) in LOADS.items():
             if (points := getattr(self, key)) is not None:
                 from_zero = from_zero or self.zero == FIRST_TOUCH

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 from patchlaw.geometry import Control, ShearControl
 from patchlaw.support import (
     Count,
+    Distance,
     InputError,
     Length,
     Limits,
@@ -56,7 +57,7 @@ class Step:
     carried: float = 0.0
     tilt: tuple[Slope, Slope] | None = (0.0, 0.0)
     shear: ShearControl | None = None
-    slid: Annotated[Length, Limits(ge=0)] = 0.0
+    slid: Distance = 0.0
     body_state: float = 0.0
     stage: Count | None = None
     turns: bool = False
@@ -234,7 +235,7 @@ class PretensionSection:
     """
 
     surface: Tag
-    pull: Annotated[float, Unit("N"), Limits(ge=0)]
+    pull: Annotated[float, Unit("N", zero=True), Limits(ge=0)]
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -36,8 +36,7 @@ from patchlaw.multiscale.scene.memory import (
 )
 from patchlaw.multiscale.scene.parts import SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support import Array
+from patchlaw.support import Array, located
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
@@ -493,6 +492,6 @@ def _placed(parts: SceneParts, meshes: Meshes) -> Meshes:
         first, counter = first.placed(place), counter and counter.placed(place)
     for mesh, key in ((first, "body.place"), (counter, "counter_body.contact")):
         if mesh is not None:
-            with located(parts.scene, key):
+            with located(parts.scene.file, key):
                 mesh.check_covers(lengths)
     return first, counter

@@ -32,8 +32,7 @@ from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
-from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support import Array, on_root_alone
+from patchlaw.support import Array, located, on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape
@@ -285,7 +284,7 @@ class ReferenceCoupling(Coupling):
         for shape in shapes:
             self.clock.tell("meshes", len(made), len(shapes))
             finest = shape is shapes[-1]
-            with located(self.scene, "surface"):
+            with located(self.scene.file, "surface"):
                 body, quality = self._rough(shape, flat)
             problem = UnilateralContactProblem(
                 body,
@@ -304,7 +303,7 @@ class ReferenceCoupling(Coupling):
         from patchlaw.macro.contact.rough_face import FlatBody
 
         tag = first.body.mesh.facet_tag(section.contact)
-        with located(self.scene, "body.mesh"):
+        with located(self.scene.file, "body.mesh"):
             return FlatBody(
                 body=first.body, contact=tag, frame=first.frame, lengths=self.parts.surface.lengths
             )

@@ -27,8 +27,7 @@ from patchlaw.multiscale.models.cell_contact import on_few_cells
 from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support import Array, InputError
+from patchlaw.support import Array, InputError, located
 
 _BISECTED = 1.6
 """Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""
@@ -167,7 +166,7 @@ def reference_meshes(
         raise InputError(problem, key="block.margin", value=block.margin, allowed="0")
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     linear = block is not None and body.element == "P1"
-    with located(scene, "reference.fine"):
+    with located(scene.file, "reference.fine"):
         shapes = reference_shapes(
             surface,
             _largest_approach(scene, approach),

@@ -40,8 +40,8 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
-from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth, located
-from patchlaw.support import Array, shared
+from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth
+from patchlaw.support import Array, located, shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
@@ -67,7 +67,7 @@ class RepresentativeCoupling(Coupling):
         self.further_fields: list[Callable[[LoadStep], Any]] = []
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face
-            with located(self.scene, "counter_body.contact"):
+            with located(self.scene.file, "counter_body.contact"):
                 face.check_common()
 
     # --- what is said of it

@@ -24,13 +24,8 @@ from patchlaw.multiscale.scene.loads import check_load, check_patches, loads_on
 from patchlaw.multiscale.scene.memory import check_memory, scene_requests
 from patchlaw.multiscale.scene.parts import BodyFacts, Facts, SceneParts, second_material
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import (
-    located,
-    make_surfaces,
-    region_samples,
-    sample_surface,
-)
-from patchlaw.support import Comm, InputError, checked, on_root_alone
+from patchlaw.multiscale.scene.surfaces import make_surfaces, region_samples, sample_surface
+from patchlaw.support import Comm, InputError, checked, located, on_root_alone
 
 
 def scene_parts(scene: Scene, facts: Facts, nodes: ClusterNodes) -> SceneParts:
@@ -189,7 +184,7 @@ def trial_coupling(
     """Make the coupling of a scene whose open keys are as they are by default; see `make_setup`."""
     _load_finite_elements(scene, comm)
     module, _, name = _COUPLINGS[scene.kind].partition(".")
-    with located(scene):
+    with located(scene.file):
         first, counter = meshes = read(scene, comm)
         facts = first.facts if first else None, counter.facts if counter else None
         parts = on_root_alone(large_object_comm(comm), lambda: scene_parts(scene, facts, nodes))

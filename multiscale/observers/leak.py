@@ -47,7 +47,7 @@ from patchlaw.multiscale.readable import (
     usual_unit,
     with_most,
 )
-from patchlaw.support import Array, Indices, InputError, on_root_alone
+from patchlaw.support import Array, Indices, InputError, located, on_root_alone
 from patchlaw.support.network import network_flow
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -309,13 +309,11 @@ class FaceLeakObserver(LeakObserver):
         first = coupling.bodies.first
         assert first is not None, "scenes without a body on a mesh are refused"
         tagged = first.body.mesh
-        try:
+        with located(coupling.scene.file):
             tags = [
                 tagged.facet_tag(getattr(self._section, key), key=f"leak.{key}")
                 for key in ("inlet", "outlet")
             ]
-        except InputError as error:
-            raise error.located(file=coupling.scene.file) from None
         edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
         self._face = self._leaking(edges)  # refuses edges that do not fit before all else
         self._errors = [mean_error(region.surfaces, 2) for region in coupling.parts.samples]
@@ -334,10 +332,8 @@ class FaceLeakObserver(LeakObserver):
         whole, law = self._coupling.bodies.contact_face, self._coupling.scene.law
         first, axes = whole.sides[0], law.axes or "x"
         where: Any = (first.space.mesh, first.facets, first.quadrature, edges, whole.on_both)
-        try:
+        with located(self._coupling.scene.file, "leak"):
             return LeakingFace(*where, axes=axes, centre=law.centre)
-        except InputError as error:
-            raise error.located(key="leak", file=self._coupling.scene.file) from None
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the leak, and what of it leaves from each region."""

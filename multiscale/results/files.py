@@ -27,7 +27,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState,
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
-from patchlaw.support import Array, Counts, InputError, check_fields, checked
+from patchlaw.support import Array, Counts, InputError, check_fields, checked, located
 from patchlaw.support.displayed import Displayed, Table, dataset
 from patchlaw.support.files import (
     OwnFiles,
@@ -308,7 +308,7 @@ def _maps(path: Path, counts: dict[int, int]) -> dict[int, dict[str, Any]]:
         return {}
     with optional_packages():
         import h5py
-    try:
+    with located(str(path), unreadable="has no maps of these contacts"):
         content = path.read_bytes()
         check_hdf5(content)
         with h5py.File(BytesIO(content), "r") as file:
@@ -317,10 +317,6 @@ def _maps(path: Path, counts: dict[int, int]) -> dict[int, dict[str, Any]]:
                 step: {name: np.asarray(group[name][()]) for name in FIELDS if name in group}
                 for step, group in groups.items()
             }
-    except InputError as error:
-        raise error.located(file=str(path)) from None
-    except Exception as error:  # h5py raises errors of many families
-        raise InputError(f"has no maps of these contacts: {error}", file=str(path)) from None
 
 
 _NAMES = {
@@ -454,15 +450,10 @@ def _read_xdmf(
     """Return mesh, times, and values at all times, by the names that those of the file have."""
     with optional_packages():
         import h5py
-    try:
+    with located(str(path), unreadable=f"cannot be read with {path.stem}.h5 beside it"):
         domain = ElementTree.parse(path).getroot()[0]
         with h5py.File(path.with_suffix(".h5"), "r") as file:
             return _mesh(domain, file), *_values(domain, file, names)
-    except InputError as error:
-        raise error.located(file=str(path)) from None
-    except Exception as error:  # h5py raises errors of many families
-        problem = f"cannot be read with {path.stem}.h5 beside it: {error}"
-        raise InputError(problem, file=str(path)) from None
 
 
 def _mesh(domain: Any, file: Any) -> dict[str, Any]:

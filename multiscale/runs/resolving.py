@@ -25,8 +25,8 @@ from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory, scene_
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import flat, to_dict
-from patchlaw.multiscale.scene.surfaces import located, make_surface
-from patchlaw.support import Comm, InputError, NotConverged, checked, on_root_alone
+from patchlaw.multiscale.scene.surfaces import make_surface
+from patchlaw.support import Comm, InputError, NotConverged, checked, located, on_root_alone
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
     from patchlaw.multiscale.runs.refining import Found, Search
@@ -81,7 +81,7 @@ def resolve(
         observe=observe or (lambda what, done, most: None),
     )
     unmeasured = {"patches.grid"} if scene.law.representative else {"patches.grid", "block.cells"}
-    with located(scene):
+    with located(scene.file):
         start, why = _start(scene, search, measured=not opened <= unmeasured)
         if opened <= unmeasured:
             return start

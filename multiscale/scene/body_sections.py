@@ -385,4 +385,4 @@ class RegionSection(SurfaceSection):
     surface: Tag
     hardness: PositivePressure | Literal["inf"] | None = None
     friction: Coefficient | None = None
-    wear: Annotated[float, Unit("1/MPa"), Limits(ge=0)] | None = None
+    wear: Annotated[float, Unit("1/MPa", zero=True), Limits(ge=0)] | None = None

@@ -15,8 +15,7 @@ from patchlaw.multiscale.loading.path import BodyLoads, Path, Quantity, Step, st
 from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support import InputError, part_of
+from patchlaw.support import InputError, located, part_of
 
 Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
@@ -88,7 +87,7 @@ def loads_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> LoadsOnF
             that is left for the contact is negative.
     """
     loading = scene.loading
-    with located(scene, "load.zero"):
+    with located(scene.file, "load.zero"):
         depth = Zero(loading.zero).depth(surfaces)
     pulls = [0.0] if scene.body is None else [one.pull for one in body_states(scene, "body")]
     path = loading.path(depth, area, pulls)

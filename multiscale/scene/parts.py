@@ -35,8 +35,8 @@ from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import RegionSamples, located
-from patchlaw.support import Array, Flags, part_of
+from patchlaw.multiscale.scene.surfaces import RegionSamples
+from patchlaw.support import Array, Flags, located, part_of
 
 Cells = tuple[int, int, int]
 
@@ -133,7 +133,7 @@ class BodyFacts:
         """
         block = block_section(scene)
         lengths = block.lengths or surface.lengths
-        with located(scene, "block"):
+        with located(scene.file, "block"):
             shape = BlockShape(
                 interface=lengths,
                 height=block.height_under(lengths),
@@ -222,7 +222,7 @@ class SceneParts:
             InputError: When a surface is.
         """
         if self.finite_slopes:
-            with located(self.scene, "micro.finite_slopes"):
+            with located(self.scene.file, "micro.finite_slopes"):
                 for surface in self.sloped_surfaces:
                     check_finite_slopes(surface)
 

@@ -61,6 +61,13 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         raise InputError(problem, key=key, allowed=allowed or None)
 
 
+def _summits(scene: SceneSections, key: str, why: str, other: str = "") -> Iterator[Refusal]:
+    """Yield a key that micro models of summits have no use for, and why."""
+    if (model := scene.micro.model) != "half-space":
+        problem = f"does not go with micro.model = '{model}', which {why}"
+        yield key, problem, f"{_CELLS}; or {other}" if other else _CELLS
+
+
 def _bodies(scene: SceneSections) -> Iterator[Refusal]:
     block, samples = scene.block, scene.law.representative
     if block is None and scene.body is None:
@@ -186,9 +193,7 @@ def _hardness(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what micro models, and patch laws that stand for them, do not know of yielding."""
     if not (key := scene.hardness_key):
         return
-    if (model := scene.micro.model) != "half-space":
-        problem = f"does not go with micro.model = '{model}', which has no cells to yield"
-        yield key, problem, _CELLS
+    yield from _summits(scene, key, "has no cells to yield")
     if scene.loading.unloads and scene.by_laws:
         yield key, *TURNS_BACK
 
@@ -205,9 +210,7 @@ def _leak(scene: SceneSections) -> Iterator[Refusal]:
     if scene.law.representative and not leak.between_edges:
         problem = f"is required with {_SAMPLES}: the fluid flows over the face"
         yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-    if (model := scene.micro.model) != "half-space":
-        problem = f"does not go with micro.model = '{model}', which knows no gaps beside summits"
-        yield "leak", problem, _CELLS
+    yield from _summits(scene, "leak", "knows no gaps beside summits")
 
 
 def _conductance(scene: SceneSections) -> Iterator[Refusal]:
@@ -221,9 +224,9 @@ def _conductance(scene: SceneSections) -> Iterator[Refusal]:
             "stiffness is that of contacts that yield, which conduct all the same",
             _CONCURRENT,
         )
-    if (model := scene.micro.model) != "half-space" and not scene.by_laws:
-        problem = f"does not go with micro.model = '{model}' without laws"
-        yield "conductance", problem, f"{_CELLS}; or coupling.kind = 'consistent' or 'isolated'"
+    if not scene.by_laws:
+        laws = "coupling.kind = 'consistent' or 'isolated'"
+        yield from _summits(scene, "conductance", "tells none without laws", laws)
 
 
 def _friction(scene: SceneSections) -> Iterator[Refusal]:
@@ -247,9 +250,8 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
         kind = f"coupling.kind = '{scene.coupling.kind}'"
         problem = f"does not go with {kind}, which has no tangential tractions"
         yield "friction", problem, "another coupling.kind, or laws of samples"
-    elif (model := scene.micro.model) != "half-space":
-        problem = f"does not go with micro.model = '{model}', which has no cells"
-        yield "friction", problem, f"{_CELLS}; or laws"
+    elif scene.micro.model != "half-space":
+        yield from _summits(scene, "friction", "has no cells", "laws")
     elif not (scene.loading.shear_key or scene.loading.slides):
         problem = "has no effect without shear"
         yield "friction", problem, "load.shear, load.shear_force or load.sliding beside it"
@@ -310,8 +312,7 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         ):
             if stated:
                 yield "wear", f"does not go with {key} under laws: {reason}", out
-    if (model := scene.micro.model) != "half-space":
-        yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
+    yield from _summits(scene, "wear", "has no cells")
     if scene.counter_surface is not None:
         problem = "does not go with a rough counter surface, whose summits slide along"
         yield "wear", problem, "leave [counter_surface] out"

@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,16 @@ import numpy as np
 from patchlaw.multiscale.scene.rules import check_together
 from patchlaw.multiscale.scene.schema import flat, keys_beside, read, scene_keys, to_dict
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support import KEY, InputError, checked, did_you_mean, reading
+from patchlaw.support import (
+    KEY,
+    InputError,
+    check_file,
+    checked,
+    did_you_mean,
+    located,
+    part_of,
+    reading,
+)
 from patchlaw.support.displayed import Displayed, Table
 
 MOST_BYTES = 64 * 1024
@@ -71,7 +80,9 @@ def read_scene_file(path: Path) -> dict[str, Any]:
     Raises:
         InputError: When it is no regular file, cannot be read, is too large or no TOML.
     """
-    content = _content(path)
+    check_file(path, str(path))
+    with reading(path, str(path)), path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
     if path.suffix.lower() != ".toml" and _may_be_heights(content):
         raise InputError(
             f"is no scene, it looks like a height map: 'patchlaw init {path}' writes one for it",
@@ -88,18 +99,6 @@ def read_scene_file(path: Path) -> dict[str, Any]:
     except ValueError as error:
         problem = f"is not valid TOML: {error}"
     raise InputError(problem, file=str(path))
-
-
-def _content(path: Path) -> bytes:
-    """Return the bytes of a regular file, as many as a scene may have and one more."""
-    try:
-        if path.exists() and not path.is_file():
-            raise ValueError("it is not a regular file")
-        with path.open("rb") as file:
-            return file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
 
 
 def _may_be_heights(content: bytes) -> bool:
@@ -247,13 +246,11 @@ class Scene(Displayed, SceneSections):
             InputError: When anything is wrong; names file, key, value and what is allowed.
         """
         data = _copied(data)
-        try:
+        with located(str(source) if source else None):
             refuse_removed(data)
-            sections = read(cls, data, _unknown_key)
-            scene = replace(sections, source=source, written=data)
+            sections = read(SceneSections, data, _unknown_key)
+            scene = cls(**part_of(sections, SceneSections), source=source, written=data)
             check_together(scene, scene.stated("coupling"))
-        except InputError as error:
-            raise error.located(file=str(source) if source else None) from None
         return scene
 
     @checked
@@ -413,10 +410,8 @@ def identity(scene: Scene) -> dict[str, Any]:
     """
 
     def digest(key: str, path: Path) -> str:
-        try:
+        with located(key=key):
             return content_digest(path)[:20]
-        except InputError as error:
-            raise error.located(key=key) from None
 
     digests = {key: digest(key, path) for key, path in scene.files().items()}
     return flat_identity(scene.to_dict(), digests, version("patchlaw"))

@@ -11,29 +11,29 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, cast, get_args, get_type_hints
 
-import pydantic
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+from pydantic import TypeAdapter, ValidationError
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import SchemaValidator
 
 from patchlaw.multiscale.scene.body_sections import HeightMap
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support import InputError, Limits, Unit, key_of
-from patchlaw.support.quantities import example, named, parse_quantity
+from patchlaw.support import InputError, Unit, key_of
 
 T = TypeVar("T")
 Complain = Callable[[list[str]], InputError]
 """Returns the error on the place of a key that a section does not have."""
 
-_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 _OF_NUMBERS = re.compile(r" \[(?:mm⁴?|MPa|N)\]")
 """A unit in a docstring, which the type of the field states too."""
 _ARGUMENT = re.compile(r"^    (\w+): ", re.MULTILINE)
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
 """Names of types that stand at the end of a key's place where it may have several."""
+_EXTRA = "unexpected_keyword_argument"
+"""What pydantic calls the problem with a key that there is none of."""
 
 
 def _unknown(path: list[str]) -> InputError:
@@ -44,21 +44,39 @@ def read(record: type[T], data: Any, unknown: Complain = _unknown) -> T:
     """Read a section.
 
     Args:
-        record: The class of the record.
+        record: The class of the record, whose ``__pydantic_config__`` forbids further keys.
         data: The section as a scene file has it.
         unknown: Returns the error on a key that there is none of.
 
     Raises:
         InputError: When anything is wrong: the first problem, with key, value and what is allowed.
     """
-    given = frozenset(data) if isinstance(data, Mapping) else None
-    model = model_of(cast(Any, record), given)
     try:
-        return _made(record, model.model_validate(data))
-    except pydantic.ValidationError as error:
+        return cast(T, _validator(cast(Any, record)).validate_python(data))
+    except ValidationError as error:
         raise _first_problem(error, unknown) from None
-    except InputError as refusal:
-        raise _placed(refusal, None, data) from None
+
+
+@cache
+def _validator(record: Any) -> SchemaValidator:
+    """Return what reads a record, whose numbers and truth values are none of texts or each other.
+
+    All of pydantic would be strict otherwise, and no list be taken for a tuple.
+    """
+    schema = TypeAdapter(record).core_schema
+
+    def be_strict(part: Any) -> None:
+        if isinstance(part, dict):
+            if part.get("type") in ("float", "int", "bool"):
+                part["strict"] = True
+            part = part.values()
+        if not isinstance(part, str):
+            for inner in part:
+                if isinstance(inner, dict | list | tuple):
+                    be_strict(inner)
+
+    be_strict(schema)
+    return SchemaValidator(schema)
 
 
 def to_dict(record: Any, *, whole: bool = True) -> Any:
@@ -79,32 +97,6 @@ def to_dict(record: Any, *, whole: bool = True) -> Any:
     return record.digest if isinstance(record, HeightMap) else record
 
 
-@cache
-def model_of(record: Any, given: frozenset[Any] | None = None) -> type[BaseModel]:
-    """Return the pydantic model that checks what is written of a record, and describes it.
-
-    Args:
-        record: A dataclass.
-        given: Its keys that are written; the model then has these and the required ones alone, as
-            pydantic takes long for sections. None for all.
-    """
-    hints, (summary, meanings) = get_type_hints(record, include_extras=True), described(record)
-    keys = {field.name: field for field in fields(record) if key_of(field)}
-    if given is not None:
-        keys = {name: field for name, field in keys.items() if _is_read(field, given)}
-    stated: dict[str, Any] = {
-        name: (_readable(hints[name]), _stated(keys[name], meanings.get(name, "")))
-        for name in meanings or keys  # Python may be told to drop docstrings
-        if name in keys
-    }
-    return pydantic.create_model(record.__name__, __config__=_CONFIG, __doc__=summary, **stated)
-
-
-def _is_read(field: Field[Any], given: frozenset[Any]) -> bool:
-    """Whether a key is given, or has to be."""
-    return key_of(field) in given or field.default is field.default_factory is MISSING
-
-
 def described(record: Any) -> tuple[str, dict[str, str]]:
     """Return what docstrings say of a record, and of its fields, then of those of its bases.
 
@@ -120,91 +112,14 @@ def described(record: Any) -> tuple[str, dict[str, str]]:
     return (inspect.getdoc(record) or "").partition("\n\nArgs:\n")[0], meanings
 
 
-def _stated(field: Field[Any], meaning: str) -> Any:
-    """Return default, name and meaning of a key as pydantic takes them."""
-    default: dict[str, Any] = {}
-    if field.default is not MISSING:
-        default = {"default": field.default}
-    elif field.default_factory is not MISSING:
-        default = {"default": field.default_factory()}
-    return pydantic.Field(alias=key_of(field), description=meaning, **default)
-
-
-def _readable(kind: Any) -> Any:
-    """Return a type as pydantic is to read it: records from sections, numbers from quantities."""
-    origin, parts = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        zero = any(isinstance(mark, Limits) and mark.ge == 0 for mark in kind.__metadata__)
-        checks = [check for mark in kind.__metadata__ for check in _checks(mark, zero)]
-        return Annotated[_readable(parts[0]), *checks]
-    if origin in (Union, UnionType):
-        return Union[tuple(_readable(one) for one in parts)]  # noqa: UP007
-    if origin in (tuple, list, dict):
-        return origin[tuple(one if one is ... else _readable(one) for one in parts)]
-    if is_dataclass(kind) and isinstance(kind, type):
-        return Annotated[model_of(kind), AfterValidator(lambda model: _made(kind, model))]
-    if kind in (float, int, bool):
-        return Annotated[kind, pydantic.Field(strict=True)]
-    return kind
-
-
-def _made(record: type[T], model: BaseModel) -> T:
-    return record(**{name: getattr(model, name) for name in type(model).model_fields})
-
-
-def _checks(mark: Any, zero: bool) -> Iterator[Any]:
-    """Yield what pydantic is to do for a mark on a type, whose other marks name 0 as the least."""
-    if isinstance(mark, Limits):
-        yield pydantic.Field(gt=mark.gt, ge=mark.ge, lt=mark.lt, le=mark.le)
-    elif isinstance(mark, Unit):
-        yield BeforeValidator(lambda value: _parsed(value, mark, zero))
-        yield _schema(mark)
-    else:
-        yield mark
-
-
-def _parsed(value: Any, unit: Unit, zero: bool) -> Any:
-    if unit.pairs:
-        return _pairs(value, unit)
-    if not unit.several:
-        return parse_quantity(value, unit.name, zero=zero)
-    listed = value if isinstance(value, list | tuple) else [value]
-    return tuple(parse_quantity(one, unit.name) for one in listed)
-
-
-def _pairs(value: Any, unit: Unit) -> tuple[tuple[float, ...], ...]:
-    """Read one pair of quantities along x and y, or a list of pairs."""
-    listed = value if isinstance(value, list | tuple) else [value]
-    pairs = listed if listed and isinstance(listed[0], list | tuple) else [listed]
-    if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
-        shown = example(unit.name)
-        allowed = f"[{shown}, {shown}], or a list of such pairs"
-        raise InputError("is no pair of quantities along x and y", allowed=allowed)
-    return tuple(tuple(parse_quantity(one, unit.name) for one in pair) for pair in pairs)
-
-
-def _schema(unit: Unit) -> WithJsonSchema:
-    """Describe a quantity, or one or several, for editors and for the JSON Schema of a scene."""
-    one = {
-        "anyOf": [{"type": "number"}, {"type": "string"}],
-        "description": f"string with a unit, or a bare number in {named(unit.name)}",
-        "unit": unit.name,
-        "examples": [example(unit.name).strip('"')],
-    }
-    listed = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
-    pair = {"type": "array", "items": one, "minItems": 2, "maxItems": 2}
-    pairs = {"anyOf": [pair, {"type": "array", "items": pair, "minItems": 1}]}
-    return WithJsonSchema(pairs if unit.pairs else listed if unit.several else one)
-
-
-def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputError:
+def _first_problem(error: ValidationError, unknown: Complain) -> InputError:
     """Return the first problem that pydantic has with what was written, with key and value."""
     problems = error.errors(include_url=False)
     # A misspelt key also leaves its true name missing: the misspelling is what to say.
-    problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
+    problems.sort(key=lambda problem: problem["type"] != _EXTRA)
     problem = problems[0]
     path = [str(part) for part in problem["loc"]]
-    if problem["type"] == "extra_forbidden":
+    if problem["type"] == _EXTRA:
         return unknown(path)
     # of a key with several types pydantic names the type, and has a problem for each
     if path and path[-1] in _OF_TYPES:
@@ -216,7 +131,7 @@ def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputE
         return InputError(few, key=".".join(path[:-1]), value=list(problem["input"]))
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
-    if problem["type"] == "model_type":
+    if problem["type"] == "dataclass_type":
         return InputError("must be a section", key=key, value=problem["input"])
     instead = "".join(
         f", or {other['ctx']['expected']}"
@@ -283,9 +198,30 @@ class Key:
         return "not given" if default is None else json.dumps(default)
 
 
+class _Describing(GenerateJsonSchema):
+    """Takes the meanings of keys from docstrings, and their order."""
+
+    def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+        found, record = super().dataclass_schema(schema), schema["cls"]
+        found["description"], meanings = described(record)
+        keys, known = {one.name: key_of(one) for one in fields(record)}, found["properties"]
+        ordered = {keys.get(name): {"description": text} for name, text in meanings.items()}
+        ordered = {key: known[key] | text for key, text in ordered.items() if key in known}
+        return found | {"properties": ordered or known}
+
+
+def json_schema(record: Any) -> dict[str, Any]:
+    """Return the JSON Schema of a record, whose ``__pydantic_config__`` forbids further keys.
+
+    Args:
+        record: A dataclass.
+    """
+    return TypeAdapter(record).json_schema(schema_generator=_Describing)
+
+
 def scene_schema() -> dict[str, Any]:
     """Return the JSON Schema of scene files."""
-    return model_of(SceneSections).model_json_schema(by_alias=True) | {"title": "Scene"}
+    return json_schema(SceneSections) | {"title": "Scene"}
 
 
 @cache

@@ -6,11 +6,10 @@ conducts, leaks, vibrates.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
@@ -27,6 +26,8 @@ from patchlaw.multiscale.scene.body_sections import (
 from patchlaw.support import (
     KEY,
     Count,
+    Distance,
+    Grid,
     Heights,
     InputError,
     Length,
@@ -41,7 +42,6 @@ from patchlaw.support import (
 )
 from patchlaw.support.quantities import example
 
-Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
 
@@ -55,7 +55,7 @@ class PatchesSection:
             results by them.
     """
 
-    grid: Pair = (4, 4)
+    grid: Grid = (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,25 +113,19 @@ class CouplingSection:
     table_tolerance: Annotated[float, Limits(gt=0, lt=0.1)] | None = None
 
     def __post_init__(self) -> None:
-        for statement, key, allowed in self._restrictions():
+        laws = {"isolated", "consistent"}
+        for key, default, kinds in (
+            ("love", "mean", {"isolated"}),
+            ("interface", "patchwise", laws),
+            ("table_tolerance", None, laws),
+        ):
             value = getattr(self, key)
-            if value not in allowed:
-                instead = " or ".join(repr(one) for one in allowed if one is not None)
+            # the analytic one ignores what is about patches and finite elements
+            if value != default and self.kind not in {*kinds, "analytic"}:
                 raise InputError(
-                    f"{key} = {value!r} does not go with {statement}",
-                    allowed=f"{key} = {instead}" if instead else "leave it out",
+                    f"{key} = {value!r} does not go with kind = '{self.kind}'",
+                    allowed=f"{key} = {default!r}" if default else "leave it out",
                 )
-
-    def _restrictions(self) -> Iterator[tuple[str, str, tuple[str | None, ...]]]:
-        """Yield a statement of this section, a key, and the values that the key may have then."""
-        if self.kind == "analytic":  # ignores what is about patches and finite elements
-            return
-        kind = f"kind = '{self.kind}'"
-        if self.kind != "isolated":
-            yield kind, "love", ("mean",)
-        if self.kind in ("concurrent", "reference"):  # which have no laws
-            yield kind, "interface", ("patchwise",)
-            yield kind, "table_tolerance", (None,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -341,7 +335,7 @@ class ConductanceSection:
     conductivity: Annotated[tuple[float, ...], Unit("W/m/K", several=True)] | None = None
     resistivity: Annotated[tuple[float, ...], Unit("ohm*m", several=True)] | None = None
     gas: Annotated[float, Unit("W/m/K"), Positive] | None = None
-    temperature_jump: Annotated[Length, Limits(ge=0)] | None = None
+    temperature_jump: Distance | None = None
     temperature: Annotated[float, Unit("K"), Positive] | None = None
     emissivity: Annotated[float, Limits(gt=0, le=1)] | None = None
 
@@ -508,6 +502,8 @@ class SceneSections:
         output: What is written beside the tables of results.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid", allow_inf_nan=False)
+
     accuracy: Annotated[float, Limits(gt=0, lt=0.5)] | None = None
     surface: SurfaceSection
     counter_surface: CounterSurfaceSection | None = None
@@ -521,7 +517,7 @@ class SceneSections:
     wear: WearSection | None = None
     coupling: CouplingSection = field(default_factory=CouplingSection)
     reference: ReferenceSection = field(default_factory=ReferenceSection)
-    loading: LoadHistory = field(metadata={KEY: "load"})
+    loading: Annotated[LoadHistory, Field(alias="load")] = field(metadata={KEY: "load"})
     conductance: ConductanceSection | None = None
     leak: LeakSection | None = None
     vibration: VibrationSection | None = None

@@ -5,8 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -32,7 +31,7 @@ from patchlaw.geometry.preparation import Preparation, prepared
 from patchlaw.geometry.statistics import SPECTRA, check_periodic_form
 from patchlaw.multiscale.scene.body_sections import CounterSurfaceSection, SurfaceSection
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support import Array, InputError, part_of
+from patchlaw.support import Array, InputError, located, part_of
 
 WHOLE = "face"
 """Name of the contact face where the mesh gives it none."""
@@ -59,7 +58,7 @@ def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
     own = sample_surface(scene, scene.surface, "surface")
     if scene.counter_surface is None:
         return own, None
-    with located(scene, "counter_surface"):
+    with located(scene.file, "counter_surface"):
         counter = laid_counter_surface(scene, scene.counter_surface, own)
         return facing(own, counter), counter
 
@@ -107,13 +106,13 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
     """
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
-        with located(scene, f"{key}.spectrum"):
+        with located(scene.file, f"{key}.spectrum"):
             whole = synthesise(section.spectrum, **extent)
             surface = prepared(whole, section, SPECTRA)
             if section.periodic:
                 check_periodic_form(whole.heights, surface.heights, section.detrend)
     elif section.heights is not None:
-        with located(scene, f"{key}.heights"):
+        with located(scene.file, f"{key}.heights"):
             return surface_of(
                 section.heights.values,
                 lengths=section.lengths or (0.0, 0.0),
@@ -125,25 +124,11 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
         extent |= {"height_unit": section.height_unit, "xy_unit": section.xy_unit}
         extent |= {"channel": section.channel, "periodic": section.periodic}
         extent |= part_of(section, Preparation)
-        with located(scene, key if key == "law.samples" else f"{key}.file"):
+        with located(scene.file, key if key == "law.samples" else f"{key}.file"):
             surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
         return replace(surface, periodic=True)
     return surface
-
-
-@contextmanager
-def located(scene: Scene, key: str | None = None) -> Iterator[None]:
-    """Give errors of the input that occur within the scene's file and, without one, a key.
-
-    Args:
-        scene: The scene.
-        key: The key.
-    """
-    try:
-        yield
-    except InputError as error:
-        raise error.located(key=key, file=scene.file) from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -204,7 +189,7 @@ def region_samples(
             surfaces += [sample_surface(scene, one, "law.samples") for one in others]
             _check_different(scene, surfaces)
         if above is not None:
-            with located(scene, "counter_surface"):
+            with located(scene.file, "counter_surface"):
                 laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
                 surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
         periodic = [one.periodic for one in surfaces]
@@ -254,7 +239,7 @@ def _check_different(scene: Scene, surfaces: Sequence[Surface]) -> None:
     for (one, first), (other, second) in combinations(zip(names, surfaces, strict=False), 2):
         if np.array_equal(first.heights, second.heights):
             problem = f"has the heights of '{one}', which would count twice"
-            with located(scene, "law.samples"):
+            with located(scene.file, "law.samples"):
                 raise InputError(problem, value=other, allowed="further maps")
 
 

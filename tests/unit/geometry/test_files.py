@@ -298,7 +298,7 @@ def test_files_larger_than_memory_are_refused_unread(tmp_path, name, size):
 def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe.txt")
     for path in (tmp_path / "pipe.txt", "/dev/zero", "a\0.npy"):
-        with pytest.raises(InputError, match="there is no such file"):
+        with pytest.raises(InputError, match=r"is no regular file|there is no such file"):
             read_surface(path, lengths=(1.0, 1.0))
     with pytest.raises(InputError, match="cannot be read: File name too long"):
         read_surface(tmp_path / ("x" * 300), lengths=(1.0, 1.0))
@@ -309,7 +309,7 @@ def test_sizes_of_no_scale_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"all heights are missing .allowed: .* within ±1e\+15 mm"):
         read_surface(tmp_path / "a.txt", lengths=(1.0, 1.0))
     np.savetxt(tmp_path / "b.txt", HEIGHTS)
-    with pytest.raises(InputError, match="the lengths of the surface do not fit"):
+    with pytest.raises(InputError, match=r"lengths = .*; 1e-300 must be greater"):
         read_surface(tmp_path / "b.txt", lengths=(1e-300, 1.0))
     np.savetxt(tmp_path / "c.xyz", points() * (1e300, 1.0, 1.0))
     with pytest.raises(InputError, match=r"coordinates x, y are not finite, or beyond 1e\+15 mm"):

@@ -78,9 +78,9 @@ def test_patches_that_do_not_exist_are_refused(i):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"grid": (0, 4)}, r"\(0, 4\): the patch grid does not fit.*at least 1"),
-        ({"grid": (2.5, 4)}, "2 whole numbers"),
-        ({"lengths": (1.0, -1.0)}, "lengths of the patch grid do not fit"),
+        ({"grid": (0, 4)}, r"grid = \(0, 4\): must be 2 .*; 0 must be .* equal to 1"),
+        ({"grid": (2.5, 4)}, r"grid = \(2.5, 4\): must be 2 whole numbers"),
+        ({"lengths": (1.0, -1.0)}, "lengths = .*; -1.0 must be greater"),
         ({"origin": (np.inf, 0.0)}, "origin .* must be 2 numbers; inf must be a finite"),
         ({"origin": (0.0,)}, "origin .* must be 2 numbers"),
     ],

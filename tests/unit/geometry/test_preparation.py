@@ -143,7 +143,7 @@ def test_a_prepared_surface_stays_periodic_but_for_its_form():
         ({"filter": Filter(short=0.01)}, r"filter.short = 0.01: the short cut.*0.03125 to 1 mm"),
         ({"filter": Filter(long=2.0)}, r"filter.long = 2.0: the long cut-off .* does not fit"),
         ({"filter": Filter(short=0.5, long=0.4)}, r"leave no waves .allowed: less than .*, 0.4"),
-        ({"resample": (3, 8)}, r"the new grid of the surface does not fit"),
+        ({"resample": (3, 8)}, r"resample = .*; 3 must be greater than or equal to 4"),
     ],
 )
 def test_steps_that_do_not_fit_are_refused(steps, message):

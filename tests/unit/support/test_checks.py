@@ -2,25 +2,7 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.support import cell_counts, check_scale, frozen_array, positive_lengths
-
-
-@pytest.mark.parametrize("value", [(1, 2.5), [1, 2.5], np.array([1, 2.5])])
-def test_lengths_become_floats(value):
-    lengths = positive_lengths(value, "the plate")
-    assert lengths == (1.0, 2.5) and all(type(side) is float for side in lengths)
-
-
-@pytest.mark.parametrize("value", [(3, 4), [3, 4], np.array([3, 4])])
-def test_counts_become_ints(value):
-    counts = cell_counts(value, "the grid")
-    assert counts == (3, 4) and all(type(count) is int for count in counts)
-
-
-@pytest.mark.parametrize("value", [(3, 4, 5), (), "34", None, (3.0, 4), (3, 1), (-3, 4)])
-def test_counts_of_another_kind_are_refused(value):
-    with pytest.raises(InputError, match=r"the grid .*2 whole numbers, each at least 2"):
-        cell_counts(value, "the grid", smallest=2)
+from patchlaw.support import check_scale, frozen_array
 
 
 def test_frozen_arrays_are_copies():

@@ -86,11 +86,11 @@ def test_layers_are_graded_towards_the_interface():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"interface": (1.0, 0.0)}, "lengths of the interface do not fit"),
+        ({"interface": (1.0, 0.0)}, "interface = .*must be 2 numbers; 0.0 must be greater"),
         ({"height": 0.0}, r"height = 0\.0: must be greater than 0"),
         ({"height": float("nan")}, "height = nan: must be a finite number"),
-        ({"cells": (4, 4)}, r"\(4, 4\): the block does not fit \(allowed: 3 whole numbers"),
-        ({"cells": (4, 4, 0)}, "each at least 1"),
+        ({"cells": (4, 4)}, r"cells = \(4, 4\): must be 3 whole numbers"),
+        ({"cells": (4, 4, 0)}, "3 whole numbers; 0 must be greater than or equal to 1"),
         ({"element": "Q3"}, r"'Q3': this element is unknown \(allowed: Q1, Q2, P1, P2\)"),
         ({"grading": 0.5}, "^grading = 0.5: must be greater than or equal to 1"),
         ({"margin": -1.0}, "margin = -1.0: must be greater than or equal to 0"),

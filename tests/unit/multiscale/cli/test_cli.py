@@ -206,7 +206,7 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("run", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("run", "nowhere.toml"), "nowhere.toml: there is no such file"),
         (("run", PAPER, "--set", "block.young=3"), "did you mean 'young_modulus'"),
         (("run", PAPER, "--set", "patches.grid=[41, 2]"), "patches.grid = [41, 2]: more patches"),
         (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.grid.0 = 1: must be greater"),
@@ -215,11 +215,11 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
         (("run", PAPER, "--set", "surface.grid=[1000000, 1000000]"), "GB of memory"),
         (("run", PAPER, "--out", "x" * 300), "cannot be written to: File name too long"),
         (("run", "x" * 300), "cannot be read: File name too long"),
-        (("run", "/dev/zero"), "/dev/zero: cannot be read: it is not a regular file"),
+        (("run", "/dev/zero"), "/dev/zero: is no regular file"),
         (("run", PAPER, "--fast"), "unrecognized arguments: --fast (see: patchlaw --help)"),
         (("fly",), "invalid choice: 'fly'"),
         (("run", PAPER, "two\nlines\r"), "unrecognized arguments: two lines"),
-        (("run", "no\nwhere.toml"), "no where.toml: cannot be read"),
+        (("run", "no\nwhere.toml"), "no where.toml: there is no such file"),
         ((), "the following arguments are required: COMMAND"),
     ],
 )

@@ -2,20 +2,14 @@
 
 import re
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import get_args, get_type_hints
 
 import pydantic
 import pytest
 
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.scene.schema import (
-    bare_quantities,
-    described,
-    flat,
-    model_of,
-    read,
-    scene_keys,
-)
+from patchlaw.multiscale.scene.schema import bare_quantities, described, flat, read, scene_keys
 from patchlaw.support import key_of
 
 GIVEN = {
@@ -128,12 +122,15 @@ BESIDE = {
 """What a section with a key that may be 0 needs beside it."""
 
 
+adapter_of = cache(pydantic.TypeAdapter)
+
+
 def problem_of(record, key, value):
     """Return what is said of a value by the limits of its key; empty for nothing."""
     try:
-        model_of(record, frozenset([key])).model_validate({key: value})
+        adapter_of(record).validate_python({key: value})
     except pydantic.ValidationError as error:
-        found = [one for one in error.errors() if one["loc"][0] == key]
+        found = [one for one in error.errors() if one["loc"][:1] == (key,)]
         return next((str(one["ctx"].get("error", one)) for one in found if "ctx" in one), "")
     return ""
 

@@ -1,11 +1,12 @@
 """Records are read from sections: by their types, with the words of their docstrings."""
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import pytest
+from pydantic import ConfigDict
 
-from patchlaw.multiscale.scene.schema import described, model_of, read, to_dict
+from patchlaw.multiscale.scene.schema import described, json_schema, read, to_dict
 from patchlaw.support import KEY, InputError, Length, Limits, PositiveLength, Unit
 
 
@@ -43,6 +44,8 @@ class Plate(Bore):
         Not this.
     """
 
+    __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
+
     bores: tuple[Bore, ...] = ()
     named: dict[str, Bore] = field(default_factory=dict)
     sides: tuple[Length, Length] | None = None
@@ -75,7 +78,7 @@ def test_quantities_and_records_within_records_are_read():
         ({"radius": 1, "bores": [{"radius": "8 mm"}]}, "bores.0.radius = '8 mm': is larger"),
         ({"radius": 1, "named": {"a": {"radius": 0}}}, "named.a.radius = 0: must be greater"),
         ({"radius": 1, "count": True}, "count = True: must be a valid integer"),
-        ({"radius": 1, "inner": 1}, "inner: unknown key"),
+        ({"radius": 1, "outer": 1}, "outer: unknown key"),
         ({"radius": 1, "bores": 3}, "bores = 3: must be a list"),
         (3, "3: must be a section"),
     ],
@@ -95,7 +98,7 @@ def test_meanings_are_those_of_docstrings_own_before_inherited():
 
 
 def test_the_schema_has_units_limits_and_meanings():
-    schema = model_of(Plate).model_json_schema()
+    schema = json_schema(Plate)
     assert list(schema["properties"])[-1] == "radius" and schema["required"] == ["radius"]
     assert schema["properties"]["radius"]["unit"] == "mm"
     assert schema["properties"]["count"] == {

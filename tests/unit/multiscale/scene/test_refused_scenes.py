@@ -323,7 +323,7 @@ CELLS_REFUSED = [
      "micro": {"model": "elliptic"}},
      "leak", "does not go with micro.model = 'elliptic', which knows no gaps beside su"),
     ({"conductance": {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}, "micro": {"model": "elliptic"}},
-     "conductance", "does not go with micro.model = 'elliptic' without laws (allowed: micro.m"),
+     "conductance", "does not go with micro.model = 'elliptic', which tells none without laws"),
     ({"coupling.kind": "consistent", "conductance": {"conductivity": ["50 W/m/K", "0.2 W/m/K"]},
      "micro": {"hardness": "1 GPa"}},
      "conductance",

@@ -80,7 +80,7 @@ def test_columns_are_numbers_that_the_file_holds(tmp_path, whole):
 
 def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(InputError, match="pipe: there is no such file"):
+    with pytest.raises(InputError, match="pipe: is no regular file"):
         read_laws(tmp_path / "pipe")
     with pytest.raises(InputError, match="cannot be read: is no file; remove it, or begin"):
         read_checkpoint(tmp_path / "pipe")
