@@ -25,7 +25,7 @@ from patchlaw.multiscale.models.reference_meshes import (
     plane_over_face,
     reference_meshes,
 )
-from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import located
@@ -180,7 +180,7 @@ class ReferenceCoupling(Coupling):
             steps: Load steps of this coupling.
         """
         meshes = self.rough_meshes
-        record = reference_record(
+        record = ReferenceRecord.of(
             steps,
             meshes.sizes,
             [one.problem.body.dofs for one in self._pressed],
