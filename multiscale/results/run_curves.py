@@ -83,9 +83,11 @@ PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", 1.0)
 SLID = Quantity("slid_mm", "distance slid", "mm", "slid_mm")
 LOADS = {"pressure": PRESSURE, "approach": APPROACH, "slid": SLID}
 """What two runs can have in common where they are compared."""
+AREA = Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction")
+SEPARATION = Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm")
 OTHERS = (
-    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
-    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
+    AREA,
+    SEPARATION,
     Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
     Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
     Quantity("mean_worn_depth_mm", "mean worn depth", "mm", "mean_worn_depth_mm"),

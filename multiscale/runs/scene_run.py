@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.bodies.reader import BodyReader
@@ -37,7 +36,7 @@ if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
 
 
-class Observers:
+class Observers(list[StepObserver]):
     """What a scene wants read off its load steps: observers, in the order in which they see them.
 
     Args:
@@ -55,9 +54,9 @@ class Observers:
     """
 
     def __init__(self, coupling: Coupling) -> None:
-        self._coupling = coupling
+        self._clock = coupling.clock
         self.fields, self.contacts = FieldRecorder(coupling), ContactRecorder(coupling)
-        self._all = [self.fields, *_beside(coupling), self.contacts]
+        super().__init__([self.fields, *_beside(coupling), self.contacts])
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return a load step with the columns of all of them; collective.
@@ -67,47 +66,11 @@ class Observers:
             past: All load steps before it.
             last: Whether no other follows.
         """
-        with self._coupling.clock.phase("contact"):
-            for one in self._all:
+        with self._clock.phase("contact"):
+            for one in self:
                 if columns := one.observe(step, past, last=last):
                     step = replace(step, **columns)
         return step
-
-    def finish(self, step: LoadStep) -> LoadStep:
-        """Return the last load step of a run that ended early, with its contact; collective.
-
-        Args:
-            step: The load step that turned out to be the last.
-        """
-        with self._coupling.clock.phase("contact"):
-            return replace(step, **self.contacts.finish(step))
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of what they saw."""
-        return chain.from_iterable(one.notes(steps) for one in self._all)
-
-    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
-        """Yield what a report lists of the last load step beside its columns: name and value."""
-        return chain.from_iterable(one.results(step) for one in self._all)
-
-    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
-        """Yield figures: file, function in `multiscale.results.figures`, and its arguments."""
-        return chain.from_iterable(one.figures(history) for one in self._all)
-
-    @property
-    def fluid(self) -> Any:
-        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
-        return next(filter(None, (one.fluid for one in self._all)), None)
-
-    def write_files(self, folder: Path) -> None:
-        """Write files beside those of the fields; collective."""
-        for one in self._all:
-            one.write_files(folder)
-
-    def release(self) -> None:
-        """Let go of what holds bodies in memory."""
-        for one in self._all:
-            one.release()
 
 
 def _beside(coupling: Coupling) -> Iterator[StepObserver]:
@@ -216,7 +179,9 @@ class Run:
     def finish(self) -> None:
         """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
-            self.steps[-1] = self.observers.finish(self.steps[-1])
+            with self.clock.phase("contact"):
+                columns = self.observers.contacts.finish(self.steps[-1])
+            self.steps[-1] = replace(self.steps[-1], **columns)
 
     @property
     def contacts(self) -> tuple[ContactRecord, ...]:
@@ -226,7 +191,7 @@ class Run:
     @property
     def fluid(self) -> Any:
         """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
-        return self.observers.fluid
+        return next(filter(None, (one.fluid for one in self.observers)), None)
 
     @property
     def finished(self) -> bool:
@@ -278,11 +243,13 @@ class Run:
         accuracy = verdict(steps, self.given.accuracy, coupling.about.unmeasured())
         notes = [] if accuracy is None else [accuracy.sentence]
         notes += coupling.about.notes(self.steps)
+        notes += self._notes
+        notes += chain.from_iterable(one.notes(self.steps) for one in self.observers)
         history = History(
             steps=steps,
             patches=coupling.parts.regions or coupling.parts.patches,
             seconds=self.clock.times,
-            notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
+            notes=tuple(notes),
             accuracy=accuracy,
             reference=record,
             contact_records=tuple(self.observers.contacts.records),
@@ -299,7 +266,8 @@ class Run:
         Note:
             Collective.
         """
-        self.observers.release()
+        for one in self.observers:
+            one.release()
         self.coupling.release()
 
 

@@ -63,9 +63,9 @@ def draw_surface(
         asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface; None draws none.
     """
-    unit, heights = _centred(surface)
-    image = style.draw_image(axes, surface.lengths, heights, largest=False, cmap=style.HEIGHTS)
-    style.colour_bar(image, axes, f"height over the mean plane [{unit}]")
+    (unit, heights), look = _centred(surface), {"largest": False, "cmap": style.HEIGHTS}
+    label = "height over the mean plane"
+    style.draw_image(axes, surface.lengths, heights, label, (unit, 1.0), **look)
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if patches is not None and 1 < patches.count <= 1024:
         style.draw_patch_borders(axes, patches, colour="white")

@@ -171,7 +171,8 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", usual(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    yield from ((name, value, "") for name, value in run.observers.results(last))
+    for one in run.observers:
+        yield from ((name, value, "") for name, value in one.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
             yield column.in_report, measured(value, column.error_of(last), column.unit), ""
