@@ -75,7 +75,10 @@ class Quantity(NamedTuple):
             values = np.array([np.nan if one is None else one[zone] for one in states])
         elif name:
             values = np.asarray(getattr(history, name), float)
-        return self.per_area * values / nominal_area(history) if self.per_area else values
+        if not self.per_area:
+            return values
+        # nothing per area is nothing, where no force tells the area as well
+        return np.where(values == 0.0, 0.0, self.per_area * values / nominal_area(history))
 
 
 APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from io import BytesIO
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,37 @@ from patchlaw.support.packages import optional_packages
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
+
+
+LAYOUT = 3
+"""Counts what states of models hold: higher, whenever the same version reads others than before."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Checkpoint:
+    """A run between two load steps. Nothing in it depends on the number of ranks.
+
+    Attributes:
+        layout: The `LAYOUT` that it was written in.
+        identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
+        resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
+        laws: Bytes of the law file; empty without laws.
+        steps: The accepted load steps.
+        position: Where the load history has come to.
+        state: What the coupling's next load step starts from, see `Coupling.state`.
+        contacts: The contacts recorded so far, which count from first touch.
+        fields: What makes the states of fields so far again, as numbers of load steps and records.
+    """
+
+    layout: int
+    identity: dict[str, Any]
+    resolved: dict[str, Any]
+    laws: bytes
+    steps: tuple[LoadStep, ...] = ()
+    position: Position
+    state: Any
+    contacts: tuple[ContactRecord, ...] = ()
+    fields: tuple[tuple[int, Any], ...] = ()
 
 
 class Observers(list[StepObserver]):
@@ -203,30 +235,46 @@ class Run:
         """Values of the keys that the accuracy of the scene left open, by dotted key."""
         return chosen_keys(self.given, self.scene)
 
-    def resume(
-        self,
-        steps: Sequence[LoadStep],
-        position: Position,
-        state: Any,
-        laws: LawTable | None = None,
-        contacts: Sequence[ContactRecord] = (),
-        fields: Sequence[tuple[int, Any]] = (),
-    ) -> None:
+    def checkpoint(self, state: Any) -> Checkpoint:
+        """Return all that is needed to go on from the latest load step.
+
+        Args:
+            state: What `Coupling.state` returned.
+        """
+        laws = b""
+        if self.coupling.table is not None:
+            from patchlaw.multiscale.laws.law_table import law_bytes
+
+            laws = law_bytes(self.coupling.table)
+        return Checkpoint(
+            layout=LAYOUT,
+            identity=self.identity,
+            resolved=self.resolved,
+            laws=laws,
+            steps=tuple(self.steps),
+            position=self.position,
+            state=state,
+            contacts=tuple(self.observers.contacts.records),
+            fields=tuple(self.observers.fields.records.items()),
+        )
+
+    def resume(self, kept: Checkpoint) -> None:
         """Continue after load steps of the same scene; call it before anything is made.
 
         Args:
-            steps: The load steps accepted so far.
-            position: Position in the load history after them.
-            state: What `Coupling.state` returned then.
-            laws: The laws of the coupling then, where any were made.
-            contacts: The records of `observers.contacts` then, which count from first touch.
-            fields: The items of `observers.fields.records` then.
+            kept: The run after these load steps.
         """
-        self.steps, self.position = list(steps), position
-        self.coupling.start, self.coupling.table = state, laws
-        self.observers.contacts.records = list(contacts)
-        self.observers.fields.records = dict(fields)
-        self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
+        self.steps, self.position = list(kept.steps), kept.position
+        self.coupling.start = kept.state
+        if kept.laws:
+            from patchlaw.multiscale.laws.law_table import read_laws
+
+            self.coupling.table = read_laws(BytesIO(kept.laws))
+        self.observers.contacts.records = list(kept.contacts)
+        self.observers.fields.records = dict(kept.fields)
+        self._notes += [
+            f"resumed after load step {len(kept.steps)}; phase times are those since then"
+        ]
 
     @property
     def laws(self) -> LawTable | None:

@@ -24,7 +24,6 @@ from patchlaw.multiscale.results.run_curves import (
     over_pressure,
     pressure_between,
 )
-from patchlaw.support import Array
 
 
 @style.styled()
@@ -299,18 +298,15 @@ def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None
     nominal = nominal_area(history)
     approach, pressure = 1e3 * record.approach.value, record.force.value / nominal
     aside, above = 1e3 * record.approach.error, record.force.error / nominal
-    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0}
-    _fill_band(force, approach, pressure, aside, above, label=record.label, **look)
-    if area is not None:
-        share, error = 100 * record.area.value, 100 * record.area.error
-        _fill_band(area, pressure, share, 0.0, error, **look)
-
-
-def _fill_band(axes: Any, x: Array, y: Array, aside: Any, above: Any, **look: Any) -> None:
-    """Fill what lies within errors aside and above of a rising curve."""
-    aside, above = np.nan_to_num(aside), np.nan_to_num(above)
-    around = np.append(x - aside, (x + aside)[::-1]), np.append(y + above, (y - above)[::-1])
-    axes.fill(*around, **look)
+    share, error = 100 * record.area.value, 100 * record.area.error
+    for axes, x, y, beside, up, label in (
+        (force, approach, pressure, aside, above, record.label),
+        (area, pressure, share, 0.0, error, None),
+    ):
+        if axes is not None:
+            off, up = np.nan_to_num(beside), np.nan_to_num(up)
+            around = np.append(x - off, (x + off)[::-1]), np.append(y + up, (y - up)[::-1])
+            axes.fill(*around, color=colour, alpha=0.25, lw=0.0, label=label)
 
 
 @style.styled()
@@ -370,9 +366,8 @@ def _draw_places(axes: Any, table: Any, colours: Any) -> None:
     scale = style.map_axes(axes, patches.lengths)
     is_open = np.array([law.is_open for law in table.laws])
     shown = np.where(is_open[:, None], np.array(to_rgb(style.NO_CONTACT)), colours)
-    borders = scale * patches.borders_x, scale * patches.borders_y
-    mesh = axes.pcolormesh(*borders, np.zeros(patches.grid[::-1]))
-    mesh.set_array(None)
-    by_rows = shown.reshape(*patches.grid, 3).swapaxes(0, 1).reshape(-1, 3)
-    mesh.set(facecolor=by_rows, edgecolor="0.8", linewidth=0.4)
+    extent = (0.0, scale * patches.lengths[0], 0.0, scale * patches.lengths[1])
+    image = shown.reshape(*patches.grid, 3).swapaxes(0, 1)
+    axes.imshow(image, origin="lower", extent=extent)
+    style.draw_patch_borders(axes, patches, colour="0.8")
     axes.set_title("colours by place; open: white")

@@ -155,16 +155,7 @@ def new_figure(width: float, height: float) -> Figure:
     return StyledFigure(figsize=(width, height), layout="constrained")
 
 
-def panels(
-    rows: int,
-    columns: int,
-    height: float,
-    *,
-    width: float = FULL_WIDTH,
-    bars: Sequence[int] = (),
-    below: float = MARGINS["below"],
-    title: str = "",
-) -> tuple[Figure, list[Any]]:
+def panels(rows: int, columns: int, height: float, **about: Any) -> tuple[Figure, list[Any]]:
     """Return a figure with panels row by row, whose places are fixed before anything is drawn.
 
     Finding places that suit the labels takes longer than drawing. Here margins have room for labels
@@ -174,14 +165,11 @@ def panels(
         rows: Number of rows.
         columns: Number of columns.
         height: Height of the figure [inch].
-        width: Its width [inch].
-        bars: Numbers of the panels that have a colour bar, from 0.
-        below: Height below a panel for its labels [inch].
-        title: Title of the figure.
+        **about: ``width`` of the figure [inch], `FULL_WIDTH` by default; ``bars``, the numbers of
+            the panels that have a colour bar, from 0; ``below``, height below a panel for its
+            labels [inch]; ``title`` of the figure.
     """
-    rows_ = [(columns, height / rows)] * rows
-    count = rows * columns
-    return _in_rows(rows_, count, width=width, bars=bars, below=below, title=title, height=height)
+    return _in_rows([(columns, height / rows)] * rows, rows * columns, height=height, **about)
 
 
 def panel_grid(
@@ -214,7 +202,7 @@ def map_panels(
     *,
     width: float = FULL_WIDTH,
     below: float = MARGINS["below"],
-    title: str = "",
+    **about: Any,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with maps of one face, each with a colour bar, and then other panels.
 
@@ -227,7 +215,7 @@ def map_panels(
         plots: Number of other panels.
         width: Width of the figure [inch].
         below: Height below a panel for its labels [inch].
-        title: Title of the figure.
+        **about: ``title`` of the figure.
     """
     ratio, around = lengths[1] / lengths[0], below + MARGINS["above"]
 
@@ -247,18 +235,17 @@ def map_panels(
         rows = [row(columns, 2.0 * _PANEL_HEIGHT)] + [plain] * -(-left // 2)
     else:
         rows = [row(2) if 2 * k + 1 < maps else plain for k in range(-(-(maps + plots) // 2))]
-    shape: dict[str, Any] = {"width": width, "below": below, "title": title}
-    return _in_rows(rows, maps + plots, bars=range(maps), **shape)
+    return _in_rows(rows, maps + plots, bars=range(maps), width=width, below=below, **about)
 
 
 def _in_rows(
     rows: Sequence[tuple[int, float]],
     count: int,
     *,
-    width: float,
-    bars: Sequence[int],
-    below: float,
-    title: str,
+    width: float = FULL_WIDTH,
+    bars: Sequence[int] = (),
+    below: float = MARGINS["below"],
+    title: str = "",
     height: float = 0.0,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with rows of panels, of which the number and the height [inch] are given."""
