@@ -202,7 +202,7 @@ def map_panels(
     *,
     width: float = FULL_WIDTH,
     below: float = MARGINS["below"],
-    **about: Any,
+    title: str = "",
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with maps of one face, each with a colour bar, and then other panels.
 
@@ -215,7 +215,7 @@ def map_panels(
         plots: Number of other panels.
         width: Width of the figure [inch].
         below: Height below a panel for its labels [inch].
-        **about: ``title`` of the figure.
+        title: Title of the figure.
     """
     ratio, around = lengths[1] / lengths[0], below + MARGINS["above"]
 
@@ -235,7 +235,8 @@ def map_panels(
         rows = [row(columns, 2.0 * _PANEL_HEIGHT)] + [plain] * -(-left // 2)
     else:
         rows = [row(2) if 2 * k + 1 < maps else plain for k in range(-(-(maps + plots) // 2))]
-    return _in_rows(rows, maps + plots, bars=range(maps), width=width, below=below, **about)
+    look: dict[str, Any] = {"width": width, "below": below, "title": title}
+    return _in_rows(rows, maps + plots, bars=range(maps), **look)
 
 
 def _in_rows(
