@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from patchlaw.multiscale import Run, Scene, read_laws, write_laws
-from patchlaw.multiscale.runs.output.results_folder import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from patchlaw.support import InputError
 from patchlaw.support.files import checksum_hdf5, write_record
 
@@ -22,7 +22,7 @@ def originals(base, folder):
     """Return the bytes of a law file and of a checkpoint of a small run."""
     run = Run(Scene.from_dict(base | {"coupling": {"kind": "isolated"}}))
     write_laws(folder / "whole.laws", run.make_laws())
-    write_record(folder / "whole.state", checkpoint_of(run, {}))
+    write_record(folder / "whole.state", run.checkpoint({}))
     return (folder / "whole.laws").read_bytes(), (folder / "whole.state").read_bytes()
 
 

@@ -33,7 +33,6 @@ from patchlaw.multiscale.runs.output.figures import (
 from patchlaw.multiscale.runs.output.results import FILES, write_fields, write_results
 from patchlaw.multiscale.runs.output.results_folder import (
     FILE_NAME,
-    Checkpoint,
     CheckpointWriter,
     find_checkpoint,
     is_finished,
@@ -41,7 +40,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
     refuse_other_results,
 )
 from patchlaw.multiscale.runs.resolving import resolve
-from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.multiscale.runs.scene_run import Checkpoint, Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.support.errors import InputError, NotConverged, NotInstalled, PatchlawError
@@ -76,8 +75,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                 with following(comm) as (at, _):
                     run = Run(scene, comm, stated, at)
                 if kept is not None:
-                    past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
-                    run.resume(*past, kept.fields)
+                    run.resume(kept)
                 console.show_plan(comm, run.coupling)
                 if notice:
                     console.say(comm, notice)

@@ -29,7 +29,7 @@ from patchlaw.multiscale.models.reference_meshes import (
     reference_meshes,
 )
 from patchlaw.multiscale.readable import ProgressObserver
-from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support import Array, located, on_root_alone
@@ -342,7 +342,7 @@ class ReferenceCoupling(Coupling):
             steps: Load steps of this coupling.
         """
         meshes = self.rough_meshes
-        record = reference_record(
+        record = ReferenceRecord.of(
             steps,
             meshes.sizes,
             [one.problem.body.dofs for one in self._pressed],

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -97,8 +97,7 @@ def verdict(
     error, step = max(known, key=lambda each: each[0])
     causes = {cause: part / step.force_N for cause, part in step.errors}
     if error == math.inf:
-        largest = max(causes, key=lambda cause: causes[cause])
-        why = f"the error by {largest} could not be measured at load step {step.step}"
+        why = f"the error by {_worst(causes)} could not be measured at load step {step.step}"
         return AccuracyVerdict(requested=accuracy, step=step.step, unknown=why)
     return AccuracyVerdict(requested=accuracy, error=error, step=step.step, causes=causes)
 
@@ -157,11 +156,10 @@ class Decision:
         """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
         if self.kept or not self.errors:
             return None
-        largest = max(self.errors, key=lambda cause: self.errors[cause])
         if self.error == math.inf:
             return (
                 f"whether an accuracy of {100 * self.accuracy:.3g} % is kept is not known: the "
-                f"error by {largest} could not be measured at the largest load"
+                f"error by {_worst(self.errors)} could not be measured at the largest load"
             )
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
@@ -177,231 +175,25 @@ _REMEDIES = {
 """What lessens errors that finer cells and meshes do not."""
 
 
+def _worst(causes: Mapping[str, float]) -> str:
+    return max(causes, key=lambda cause: causes[cause])
+
+
 def _most_of_it(causes: Mapping[str, float]) -> str:
     """Return which cause errs most, and what lessens it where refinement does not."""
     if not causes:
         return ""
-    largest = max(causes, key=lambda cause: causes[cause])
-    remedy = _REMEDIES.get(largest)
-    return f", most of it by {largest}" + (f", {remedy}" if remedy else "")
+    said = f", most of it by {_worst(causes)}", _REMEDIES.get(_worst(causes))
+    return ", ".join(filter(None, said))
 
 
 def _listed(errors: Mapping[str, float]) -> str:
     if not errors:
         return "which is not measured beforehand"
     if math.inf in errors.values():
-        largest = max(errors, key=lambda cause: errors[cause])
-        return f"which is not known: the error by {largest} could not be measured"
+        return f"which is not known: the error by {_worst(errors)} could not be measured"
     causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
     return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReferenceRecord:
-    """Results of the meshes of a reference and their limits; the finest mesh is the last.
-
-    Attributes:
-        sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
-        unknowns: Degrees of freedom, shape (meshes,).
-        approach_mm: Approach on every mesh, shape (meshes, steps) [mm].
-        force_N: Force on every mesh, shape (meshes, steps) [N].
-        contact_area_fraction: Contact area relative to the nominal area, shape (meshes, steps).
-        approach: The approach at mesh size zero [mm]; exact where it is prescribed.
-        force: The force at mesh size zero [N]; exact where it is prescribed.
-        area: The contact area fraction at mesh size zero.
-    """
-
-    sizes: Array
-    unknowns: tuple[int, ...]
-    approach_mm: Array
-    force_N: Array
-    contact_area_fraction: Array
-    approach: Estimate
-    force: Estimate
-    area: Estimate
-
-    @property
-    def by_force(self) -> bool:
-        """Whether the force is prescribed: the approach then differs between the meshes."""
-        return _by_force(self.approach_mm)
-
-    @property
-    def _response(self) -> tuple[Estimate, str]:
-        """Return force or approach, whichever is not prescribed, with its unit."""
-        return (self.approach, "mm") if self.by_force else (self.force, "N")
-
-    @property
-    def _at_largest_force(self) -> tuple[float, float]:
-        """Return value and error of the response at the largest force, in mm or N."""
-        found, step = self._response[0], int(np.argmax(self.force_N[-1]))
-        return float(found.value[step]), float(found.error[step])
-
-    @property
-    def label(self) -> str:
-        """The error bar relative to the response at the largest force, for tables and legends."""
-        value, error = self._at_largest_force if self.force_N.any() else (0.0, np.nan)
-        if not np.isfinite(error):
-            return "no error bar"
-        return f"± {percent(error / (abs(value) or 1.0))}"
-
-    @property
-    def sentence(self) -> str:
-        """The discretisation error and where it is from, as reports show it."""
-        if len(self.sizes) == 1:
-            return "one mesh: no error bar; reference.meshes = 2 gives one"
-        if not self.force_N.size:
-            return "no load step, no error bar"
-        if not self.force_N.any():
-            return "no contact on any mesh, no error bar"
-        value, error = self._at_largest_force
-        _, unit = self._response
-        meshes = f"{'two' if len(self.sizes) == 2 else 'three'} meshes of a family of known order"
-        return (
-            f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
-            f"{measured(value, error, unit)} ({self.label}), from {meshes}; "
-            "the table holds the finest mesh"
-        )
-
-    @property
-    def cells(self) -> tuple[str, list[str]]:
-        """Heading and cells of a table's column that holds the values at mesh size zero."""
-        found, unit = self._response
-        if len(self.sizes) == 1:
-            return "at size zero", ["no error bar"] * found.value.size
-        name, size = usual_unit(found.value, unit)
-        return f"at size zero [{name}]", [
-            "no error bar" if np.isnan(error) else with_error(value, error) if error else "0 ± 0"
-            for value, error in zip(found.value / size, found.error / size, strict=True)
-        ]
-
-    def without_bars(self, steps: Flags) -> ReferenceRecord:
-        """Return the record with unknown errors of force and area at some load steps.
-
-        Args:
-            steps: True at these load steps, shape (steps,).
-        """
-        force, area = (
-            replace(one, error=np.where(steps, np.nan, one.error))
-            for one in (self.force, self.area)
-        )
-        return replace(self, force=force, area=area)
-
-    def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
-        """Return the load steps with the errors of force, approach and contact area.
-
-        The load steps are those of the finest mesh. Their error is the distance from the value at
-        mesh size zero, and the error bar of that value.
-
-        Args:
-            steps: The load steps.
-        """
-
-        def errors(values: Array, found: Estimate) -> list[float | None]:
-            bounds = (np.abs(values[-1] - found.value) + found.error).tolist()
-            return [None if math.isnan(bound) else bound for bound in bounds]
-
-        force = errors(self.force_N, self.force)
-        approach = errors(self.approach_mm, self.approach)
-        areas = errors(self.contact_area_fraction, self.area)
-        return tuple(
-            replace(
-                step,
-                **with_exact_zeros(
-                    step,
-                    {
-                        "force_error_N": one,
-                        "approach_error_mm": other,
-                        "contact_area_fraction_error": area,
-                    },
-                ),
-            )
-            for step, one, other, area in zip(steps, force, approach, areas, strict=True)
-        )
-
-    def counted_from(self, zero: float) -> ReferenceRecord:
-        """Return the record with approaches counted from another height.
-
-        Args:
-            zero: Approach at which the plane is at this height [mm].
-        """
-        limit = replace(self.approach, value=self.approach.value - zero)
-        return replace(self, approach_mm=self.approach_mm - zero, approach=limit)
-
-    def at(self, steps: slice) -> ReferenceRecord:
-        """Return the record of some load steps alone.
-
-        Args:
-            steps: Their places.
-        """
-        arrays = {
-            name: getattr(self, name)[:, steps]
-            for name in ("approach_mm", "force_N", "contact_area_fraction")
-        }
-        limits = {name: getattr(self, name).at(steps) for name in ("approach", "force", "area")}
-        return replace(self, **arrays, **limits)
-
-    def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
-        """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
-
-        Args:
-            steps: The load steps.
-        """
-        limits: dict[str, Sequence[float] | Array] = {
-            "step": [step.step for step in steps],
-            "approach_mm": self.approach.value,
-            "force_N": self.force.value,
-            "force_error_N": self.force.error,
-            "force_rate": self.force.rate,
-            "contact_area_fraction": self.area.value,
-            "contact_area_error": self.area.error,
-            "area_rate": self.area.rate,
-            "approach_error_mm": self.approach.error,
-            "approach_rate": self.approach.rate,
-        }
-        return limits | {
-            f"{name}_mesh_{number}": values
-            for name in ("force_N", "approach_mm", "contact_area_fraction")
-            for number, values in enumerate(getattr(self, name), 1)
-        }
-
-
-def _by_force(approach: Array) -> bool:
-    """Tell whether approaches, shape (meshes, steps), differ between the meshes."""
-    spread = np.ptp(approach, axis=0)
-    return bool(np.any(spread > 1e-12 * np.abs(approach).max(axis=0)))
-
-
-def reference_record(
-    steps: Sequence[LoadStep],
-    sizes: Array,
-    unknowns: Sequence[int],
-    *,
-    force_order: float,
-    scatter: Array | float = 0.0,
-) -> ReferenceRecord:
-    """Gather the results of every mesh, and extrapolate them to mesh size zero.
-
-    Args:
-        steps: The load steps of a reference.
-        sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
-        unknowns: Degrees of freedom of the meshes.
-        force_order: Known order of convergence of the force, and of the approach under a force.
-        scatter: Relative scatter of the force on single meshes, or of the approach under a force,
-            shape (steps,).
-    """
-    found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
-    approach, force, area = found.transpose(2, 1, 0)
-    of_approach, of_force = (scatter, 0.0) if _by_force(approach) else (0.0, scatter)
-    return ReferenceRecord(
-        sizes=sizes,
-        unknowns=tuple(unknowns),
-        approach_mm=approach,
-        force_N=force,
-        contact_area_fraction=area,
-        approach=extrapolated(approach, sizes, force_order, of_approach),
-        force=extrapolated(force, sizes, force_order, of_force),
-        area=extrapolated(area, sizes, 1.0),
-    )
 
 
 RATE_MARGIN = 1.25
@@ -415,15 +207,17 @@ contact's radius, the slowest showed 2.0."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """Values at mesh size zero; arrays over load steps.
+    """A quantity on every mesh and its values at mesh size zero; arrays over load steps.
 
     Attributes:
-        value: The values, shape (steps,).
+        meshes: The results of the meshes, the finest last, shape (meshes, steps).
+        value: The values at mesh size zero, shape (steps,); exact where they are prescribed.
         error: Half widths of their error bars, shape (steps,); NaN where nothing is known.
         rate: The known order that was used; NaN where none was, as before the first touch. Shape
             (steps,).
     """
 
+    meshes: Array
     value: Array
     error: Array
     rate: Array
@@ -434,7 +228,16 @@ class Estimate:
         Args:
             steps: Their places.
         """
-        return Estimate(value=self.value[steps], error=self.error[steps], rate=self.rate[steps])
+        return Estimate(**{one.name: getattr(self, one.name)[..., steps] for one in fields(self)})
+
+    @property
+    def of_finest(self) -> list[float | None]:
+        """Errors of the finest mesh, None where unknown: its distance from the value, and its bar.
+
+        Shape (steps,).
+        """
+        bounds = (np.abs(self.meshes[-1] - self.value) + self.error).tolist()
+        return [None if math.isnan(bound) else bound for bound in bounds]
 
 
 def extrapolated(
@@ -467,7 +270,7 @@ def extrapolated(
     results, h = _checked(values, sizes, order)
     if len(h) == 1:
         nothing = np.full(results.shape[1], np.nan)
-        return Estimate(value=results[0], error=nothing, rate=nothing.copy())
+        return Estimate(meshes=results, value=results[0], error=nothing, rate=nothing.copy())
     assert order is not None
     difference, ratio = results[0] - results[-1], h[0] / h[-1]
     correction = difference / (ratio**order - 1.0)
@@ -478,6 +281,7 @@ def extrapolated(
     error += np.abs(results - expected).max(axis=0) + np.asarray(scatter) * size
     usual = np.median(error[size > 0.0] / size[size > 0.0]) if size.any() else 0.0
     return Estimate(
+        meshes=results,
         value=results[-1] - correction,
         error=np.maximum(error, 0.5 * usual * size),
         rate=np.where(np.ptp(results, axis=0) == 0.0, np.nan, order),
@@ -499,3 +303,181 @@ def _checked(values: ArrayLike, sizes: ArrayLike, order: float | None) -> tuple[
     if order is not None and not order > 0.0:
         raise InputError("the order must be positive", value=order, allowed="> 0")
     return results, h
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReferenceRecord:
+    """Results of the meshes of a reference and their limits; the finest mesh is the last.
+
+    Attributes:
+        sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
+        unknowns: Degrees of freedom, shape (meshes,).
+        approach: The approach [mm].
+        force: The force [N].
+        area: The contact area fraction.
+    """
+
+    sizes: Array
+    unknowns: tuple[int, ...]
+    approach: Estimate
+    force: Estimate
+    area: Estimate
+
+    @classmethod
+    def of(
+        cls,
+        steps: Sequence[LoadStep],
+        sizes: Array,
+        unknowns: Sequence[int],
+        *,
+        force_order: float,
+        scatter: Array | float = 0.0,
+    ) -> ReferenceRecord:
+        """Gather the results of every mesh, and extrapolate them to mesh size zero.
+
+        Args:
+            steps: The load steps of a reference.
+            sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
+            unknowns: Degrees of freedom of the meshes.
+            force_order: Known order of convergence of the force, and of the approach under a force.
+            scatter: Relative scatter of the force on single meshes, or of the approach under a
+                force, shape (steps,).
+        """
+        found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
+        approach, force, area = found.transpose(2, 1, 0)
+        of_approach, of_force = (scatter, 0.0) if _by_force(approach) else (0.0, scatter)
+        return cls(
+            sizes=sizes,
+            unknowns=tuple(unknowns),
+            approach=extrapolated(approach, sizes, force_order, of_approach),
+            force=extrapolated(force, sizes, force_order, of_force),
+            area=extrapolated(area, sizes, 1.0),
+        )
+
+    @property
+    def by_force(self) -> bool:
+        """Whether the force is prescribed: the approach then differs between the meshes."""
+        return _by_force(self.approach.meshes)
+
+    @property
+    def _response(self) -> tuple[Estimate, str]:
+        """Return force or approach, whichever is not prescribed, with its unit."""
+        return (self.approach, "mm") if self.by_force else (self.force, "N")
+
+    @property
+    def _at_largest_force(self) -> tuple[float, float]:
+        """Return value and error of the response at the largest force, in mm or N."""
+        found, force = self._response[0], self.force.meshes
+        if not force.any():
+            return 0.0, np.nan
+        step = int(np.argmax(force[-1]))
+        return float(found.value[step]), float(found.error[step])
+
+    @property
+    def label(self) -> str:
+        """The error bar relative to the response at the largest force, for tables and legends."""
+        value, error = self._at_largest_force
+        return f"± {percent(error / (abs(value) or 1.0))}" if np.isfinite(error) else "no error bar"
+
+    @property
+    def sentence(self) -> str:
+        """The discretisation error and where it is from, as reports show it."""
+        if len(self.sizes) == 1:
+            return "one mesh: no error bar; reference.meshes = 2 gives one"
+        if not self.force.meshes.any():
+            nothing = "contact on any mesh" if self.force.meshes.size else "load step"
+            return f"no {nothing}, no error bar"
+        meshes = f"{'two' if len(self.sizes) == 2 else 'three'} meshes of a family of known order"
+        size = measured(*self._at_largest_force, self._response[1])
+        return (
+            f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
+            f"{size} ({self.label}), from {meshes}; "
+            "the table holds the finest mesh"
+        )
+
+    @property
+    def cells(self) -> tuple[str, list[str]]:
+        """Heading and cells of a table's column that holds the values at mesh size zero."""
+        found, unit = self._response
+        if len(self.sizes) == 1:
+            return "at size zero", ["no error bar"] * found.value.size
+        name, size = usual_unit(found.value, unit)
+        return f"at size zero [{name}]", [
+            "no error bar" if np.isnan(error) else with_error(value, error) if error else "0 ± 0"
+            for value, error in zip(found.value / size, found.error / size, strict=True)
+        ]
+
+    def without_bars(self, steps: Flags) -> ReferenceRecord:
+        """Return the record with unknown errors of force and area at some load steps.
+
+        Args:
+            steps: True at these load steps, shape (steps,).
+        """
+        force, area = (
+            replace(one, error=np.where(steps, np.nan, one.error))
+            for one in (self.force, self.area)
+        )
+        return replace(self, force=force, area=area)
+
+    def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
+        """Return the load steps, which are those of the finest mesh, with its errors.
+
+        Args:
+            steps: The load steps.
+        """
+        names = "force_error_N", "approach_error_mm", "contact_area_fraction_error"
+        errors = (one.of_finest for one in (self.force, self.approach, self.area))
+        return tuple(
+            replace(step, **with_exact_zeros(step, dict(zip(names, found, strict=True))))
+            for step, *found in zip(steps, *errors, strict=True)
+        )
+
+    def counted_from(self, zero: float) -> ReferenceRecord:
+        """Return the record with approaches counted from another height.
+
+        Args:
+            zero: Approach at which the plane is at this height [mm].
+        """
+        meshes, value = self.approach.meshes - zero, self.approach.value - zero
+        return replace(self, approach=replace(self.approach, meshes=meshes, value=value))
+
+    def at(self, steps: slice) -> ReferenceRecord:
+        """Return the record of some load steps alone.
+
+        Args:
+            steps: Their places.
+        """
+        parts = {name: getattr(self, name).at(steps) for name in ("approach", "force", "area")}
+        return replace(self, **parts)
+
+    def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
+        """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
+
+        Args:
+            steps: The load steps.
+        """
+        approach, force, area = self.approach, self.force, self.area
+        limits: dict[str, Sequence[float] | Array] = {
+            "step": [step.step for step in steps],
+            "approach_mm": approach.value,
+            "force_N": force.value,
+            "force_error_N": force.error,
+            "force_rate": force.rate,
+            "contact_area_fraction": area.value,
+            "contact_area_error": area.error,
+            "area_rate": area.rate,
+            "approach_error_mm": approach.error,
+            "approach_rate": approach.rate,
+        }
+        names = {"force_N": force, "approach_mm": approach, "contact_area_fraction": area}
+        return limits | {
+            f"{name}_mesh_{number}": values
+            for name, found in names.items()
+            for number, values in enumerate(found.meshes, 1)
+        }
+
+
+def _by_force(approach: Array) -> bool:
+    """Tell whether approaches, shape (meshes, steps), differ between the meshes."""
+    spread = np.ptp(approach, axis=0)
+    return bool(np.any(spread > 1e-12 * np.abs(approach).max(axis=0)))

@@ -11,7 +11,6 @@ from io import BytesIO, StringIO
 from itertools import chain
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -406,21 +405,20 @@ def read_fields(folder: str | Path, *, counter: bool = False) -> BodyFields:
     """Read the fields of a run from its results.
 
     Args:
-        folder: Folder that ``patchlaw run`` wrote with ``output.fields``; ``fields.xdmf`` and
-            ``fields.h5`` are read.
-        counter: Whether those of the counter-body are, from ``counter_fields.xdmf``.
+        folder: Folder that ``patchlaw run`` wrote with ``output.fields``; ``fields.h5`` is read.
+        counter: Whether those of the counter-body are, from ``counter_fields.h5``.
 
     Returns:
         The fields of the load steps that ``output.fields`` named.
 
     Raises:
-        InputError: When a file is missing, damaged or cut short.
+        InputError: When the file is missing, damaged or cut short.
     """
-    path = Path(folder) / ("counter_fields.xdmf" if counter else "fields.xdmf")
+    path = Path(folder) / ("counter_fields.h5" if counter else "fields.h5")
     if not path.is_file():
         allowed = "the results of a run with output.fields = 'last' or 'all', which has a body"
         raise InputError("there are no fields", file=str(path), allowed=allowed)
-    mesh, steps, values = _read_xdmf(path, _NAMES)
+    mesh, steps, values = _read_functions(path, _NAMES)
     return BodyFields(**mesh, step=np.rint(steps).astype(np.int64), **values)
 
 
@@ -428,8 +426,8 @@ def read_modes(folder: Path, *, counter: bool = False) -> tuple[dict[str, Any], 
     """Read the natural modes of a run from its results.
 
     Args:
-        folder: Folder of the results; ``modes.xdmf`` and ``modes.h5`` are read.
-        counter: Whether those of the counter-body are, from ``counter_modes.xdmf``.
+        folder: Folder of the results; ``modes.h5`` is read.
+        counter: Whether those of the counter-body are, from ``counter_modes.h5``.
 
     Returns:
         Points and cells by the names that `BodyFields` has for them, the m times, and at each of
@@ -439,45 +437,38 @@ def read_modes(folder: Path, *, counter: bool = False) -> tuple[dict[str, Any], 
     Raises:
         InputError: When a file is missing, damaged or cut short.
     """
-    path = folder / ("counter_modes.xdmf" if counter else "modes.xdmf")
-    mesh, times, values = _read_xdmf(path, {"mode": "mode"})
+    path = folder / ("counter_modes.h5" if counter else "modes.h5")
+    mesh, times, values = _read_functions(path, {"mode": "mode"})
     return mesh, times, values["mode"]
 
 
-def _read_xdmf(
+_CELL_TYPES = {
+    4: "Tetrahedron", 8: "Hexahedron", 10: "Tetrahedron_10", 20: "Hexahedron_20",
+    27: "Hexahedron_27",
+}  # fmt: skip
+"""Names that XDMF has for cells, by their numbers of vertices."""
+
+
+def _read_functions(
     path: Path, names: Mapping[str, str]
 ) -> tuple[dict[str, Any], Array, dict[str, Any]]:
-    """Return mesh, times, and values at all times, by the names that those of the file have."""
+    """Return mesh, times, and values at all times, by the names that those of the file have.
+
+    dolfinx writes a function at a time as ``/Function/name/time``, with ``_`` for the point of the
+    time, and the mesh into a group of ``/Mesh``.
+    """
     with optional_packages():
         import h5py
-    with located(str(path), unreadable=f"cannot be read with {path.stem}.h5 beside it"):
-        domain = ElementTree.parse(path).getroot()[0]
-        with h5py.File(path.with_suffix(".h5"), "r") as file:
-            return _mesh(domain, file), *_values(domain, file, names)
-
-
-def _mesh(domain: Any, file: Any) -> dict[str, Any]:
-    """Return vertices and cells, by the names that `BodyFields` has for them."""
-    topology, geometry = domain.find("Grid/Topology"), domain.find("Grid/Geometry")
-    cell_type = topology.get("TopologyType")
-    return {
-        "points_mm": _array(geometry, file).reshape(-1, 3),
-        "cells": _array(topology, file).astype(np.int64),
-        "cell_type": cell_type,
-    }
-
-
-def _values(domain: Any, file: Any, names: Mapping[str, str]) -> tuple[Array, dict[str, Array]]:
-    """Return the times, and values at all of them by name."""
-    times, values = [], dict[str, list[Array]]()
-    for grid in _load_steps(domain):
-        times.append(float(grid.find("Time").get("Value")))
-        for field in grid.findall("Attribute"):
-            name = names[field.get("Name")]
-            values.setdefault(name, []).append(_shaped(_array(field, file)))
-    if not times:
-        raise InputError("has no load steps")
-    return np.array(times), {name: np.stack(found) for name, found in values.items()}
+    times, values = [0.0], dict[str, Any]()
+    with located(str(path), unreadable="cannot be read"), h5py.File(path, "r") as file:
+        (mesh,) = file["Mesh"].values()
+        cells = mesh["topology"][()].astype(np.int64)
+        for name, function in file["Function"].items():
+            at = {float(time.replace("_", ".")): one[()] for time, one in function.items()}
+            times = sorted(at)
+            values[names[name]] = np.stack([_shaped(at[time]) for time in times])
+        found = {"points_mm": mesh["geometry"][()], "cells": cells}
+        return found | {"cell_type": _CELL_TYPES[cells.shape[1]]}, np.array(times), values
 
 
 def _shaped(array: Array) -> Array:
@@ -485,20 +476,3 @@ def _shaped(array: Array) -> Array:
     if array.shape[1] == 9:
         return array.reshape(-1, 3, 3)
     return array[:, 0] if array.shape[1] == 1 else array
-
-
-def _load_steps(domain: Any) -> Iterator[Any]:
-    """Yield the grid of every load step."""
-    for grid in domain.findall("Grid"):
-        if grid.get("GridType") == "Collection":
-            yield from grid.findall("Grid")
-
-
-def _array(element: Any, file: Any) -> Array:
-    """Return the array that an element of the file names, of the shape it states."""
-    item = element.find("DataItem")
-    shape = tuple(int(size) for size in item.get("Dimensions").split())
-    found = np.asarray(file[item.text.strip().partition(":")[2]][()])
-    if found.shape != shape:
-        raise InputError(f"states {shape} numbers where {found.shape} are")
-    return found

@@ -16,7 +16,7 @@ from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.support import Array, Count, Flags, InputError, check_fields, checked
-from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
+from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from patchlaw.support.packages import by_matplotlib
 
 if TYPE_CHECKING:  # only laws take it
@@ -223,36 +223,24 @@ class History(Displayed):
         Args:
             *names: The tables, see `Column.table`, each with the number of the load step; by
                 default the curve and the solver's work.
-            most: Load steps that are shown; of more the middle is left out, and a row says so.
+            most: Load steps that are shown; of more as many at equal distances.
         """
-        names = names or ("curve", "solver")
-        whole, half = len(self.steps) <= most, most // 2
-        shown = self.steps if whole else self.steps[:half] + self.steps[-half:]
-        columns = [
-            column
-            for column in COLUMNS
-            if column.heading and (column.table in names or column.name == "step")
-        ]
+        names, chosen = names or ("curve", "solver"), spread(len(self.steps), most)
+        shown = [self.steps[place] for place in chosen]
         texts = dict(
             column.shown(shown)
-            for column in columns
-            if column.table != "more" or any(column.of(step) for step in shown)
+            for column in COLUMNS
+            if column.heading
+            and (column.table in names or column.name == "step")
+            and (column.table != "more" or any(column.of(step) for step in shown))
         )
         if "curve" in names and (falls := self.unloading).any():
-            ways = ["unloading" if fall else "loading" for fall in falls]
-            texts = {
-                "step": texts.pop("step"),
-                "load": ways if whole else [*ways[:half], *ways[-half:]],
-                **texts,
-            }
+            ways = ["unloading" if falls[place] else "loading" for place in chosen]
+            texts = {"step": texts.pop("step"), "load": ways, **texts}
         if self.reference is not None and "curve" in names:
             heading, cells = self.reference.cells
-            texts[heading] = list(cells) if whole else [*cells[:half], *cells[-half:]]
-        rows = list(zip(*texts.values(), strict=True))
-        if not whole:
-            left = len(self.steps) - len(shown)
-            rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
-        return list(texts), rows
+            texts[heading] = [cells[place] for place in chosen]
+        return list(texts), list(zip(*texts.values(), strict=True))
 
     def zone_table(self) -> Table:
         """Return headings and rows of what the named regions of the face bear at the last step.

@@ -75,7 +75,10 @@ class Quantity(NamedTuple):
             values = np.array([np.nan if one is None else one[zone] for one in states])
         elif name:
             values = np.asarray(getattr(history, name), float)
-        return self.per_area * values / nominal_area(history) if self.per_area else values
+        if not self.per_area:
+            return values
+        # nothing per area is nothing, where no force tells the area as well
+        return np.where(values == 0.0, 0.0, self.per_area * values / nominal_area(history))
 
 
 APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm")
@@ -83,9 +86,11 @@ PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", 1.0)
 SLID = Quantity("slid_mm", "distance slid", "mm", "slid_mm")
 LOADS = {"pressure": PRESSURE, "approach": APPROACH, "slid": SLID}
 """What two runs can have in common where they are compared."""
+AREA = Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction")
+SEPARATION = Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm")
 OTHERS = (
-    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
-    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
+    AREA,
+    SEPARATION,
     Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
     Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
     Quantity("mean_worn_depth_mm", "mean worn depth", "mm", "mean_worn_depth_mm"),

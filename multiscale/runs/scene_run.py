@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from io import BytesIO
 from itertools import chain
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.bodies.reader import BodyReader
@@ -37,7 +37,38 @@ if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
 
 
-class Observers:
+LAYOUT = 3
+"""Counts what states of models hold: higher, whenever the same version reads others than before."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Checkpoint:
+    """A run between two load steps. Nothing in it depends on the number of ranks.
+
+    Attributes:
+        layout: The `LAYOUT` that it was written in.
+        identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
+        resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
+        laws: Bytes of the law file; empty without laws.
+        steps: The accepted load steps.
+        position: Where the load history has come to.
+        state: What the coupling's next load step starts from, see `Coupling.state`.
+        contacts: The contacts recorded so far, which count from first touch.
+        fields: What makes the states of fields so far again, as numbers of load steps and records.
+    """
+
+    layout: int
+    identity: dict[str, Any]
+    resolved: dict[str, Any]
+    laws: bytes
+    steps: tuple[LoadStep, ...] = ()
+    position: Position
+    state: Any
+    contacts: tuple[ContactRecord, ...] = ()
+    fields: tuple[tuple[int, Any], ...] = ()
+
+
+class Observers(list[StepObserver]):
     """What a scene wants read off its load steps: observers, in the order in which they see them.
 
     Args:
@@ -55,9 +86,9 @@ class Observers:
     """
 
     def __init__(self, coupling: Coupling) -> None:
-        self._coupling = coupling
+        self._clock = coupling.clock
         self.fields, self.contacts = FieldRecorder(coupling), ContactRecorder(coupling)
-        self._all = [self.fields, *_beside(coupling), self.contacts]
+        super().__init__([self.fields, *_beside(coupling), self.contacts])
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return a load step with the columns of all of them; collective.
@@ -67,47 +98,11 @@ class Observers:
             past: All load steps before it.
             last: Whether no other follows.
         """
-        with self._coupling.clock.phase("contact"):
-            for one in self._all:
+        with self._clock.phase("contact"):
+            for one in self:
                 if columns := one.observe(step, past, last=last):
                     step = replace(step, **columns)
         return step
-
-    def finish(self, step: LoadStep) -> LoadStep:
-        """Return the last load step of a run that ended early, with its contact; collective.
-
-        Args:
-            step: The load step that turned out to be the last.
-        """
-        with self._coupling.clock.phase("contact"):
-            return replace(step, **self.contacts.finish(step))
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of what they saw."""
-        return chain.from_iterable(one.notes(steps) for one in self._all)
-
-    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
-        """Yield what a report lists of the last load step beside its columns: name and value."""
-        return chain.from_iterable(one.results(step) for one in self._all)
-
-    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
-        """Yield figures: file, function in `multiscale.results.figures`, and its arguments."""
-        return chain.from_iterable(one.figures(history) for one in self._all)
-
-    @property
-    def fluid(self) -> Any:
-        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
-        return next(filter(None, (one.fluid for one in self._all)), None)
-
-    def write_files(self, folder: Path) -> None:
-        """Write files beside those of the fields; collective."""
-        for one in self._all:
-            one.write_files(folder)
-
-    def release(self) -> None:
-        """Let go of what holds bodies in memory."""
-        for one in self._all:
-            one.release()
 
 
 def _beside(coupling: Coupling) -> Iterator[StepObserver]:
@@ -216,7 +211,9 @@ class Run:
     def finish(self) -> None:
         """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
-            self.steps[-1] = self.observers.finish(self.steps[-1])
+            with self.clock.phase("contact"):
+                columns = self.observers.contacts.finish(self.steps[-1])
+            self.steps[-1] = replace(self.steps[-1], **columns)
 
     @property
     def contacts(self) -> tuple[ContactRecord, ...]:
@@ -226,7 +223,7 @@ class Run:
     @property
     def fluid(self) -> Any:
         """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
-        return self.observers.fluid
+        return next(filter(None, (one.fluid for one in self.observers)), None)
 
     @property
     def finished(self) -> bool:
@@ -238,30 +235,46 @@ class Run:
         """Values of the keys that the accuracy of the scene left open, by dotted key."""
         return chosen_keys(self.given, self.scene)
 
-    def resume(
-        self,
-        steps: Sequence[LoadStep],
-        position: Position,
-        state: Any,
-        laws: LawTable | None = None,
-        contacts: Sequence[ContactRecord] = (),
-        fields: Sequence[tuple[int, Any]] = (),
-    ) -> None:
+    def checkpoint(self, state: Any) -> Checkpoint:
+        """Return all that is needed to go on from the latest load step.
+
+        Args:
+            state: What `Coupling.state` returned.
+        """
+        laws = b""
+        if self.coupling.table is not None:
+            from patchlaw.multiscale.laws.law_table import law_bytes
+
+            laws = law_bytes(self.coupling.table)
+        return Checkpoint(
+            layout=LAYOUT,
+            identity=self.identity,
+            resolved=self.resolved,
+            laws=laws,
+            steps=tuple(self.steps),
+            position=self.position,
+            state=state,
+            contacts=tuple(self.observers.contacts.records),
+            fields=tuple(self.observers.fields.records.items()),
+        )
+
+    def resume(self, kept: Checkpoint) -> None:
         """Continue after load steps of the same scene; call it before anything is made.
 
         Args:
-            steps: The load steps accepted so far.
-            position: Position in the load history after them.
-            state: What `Coupling.state` returned then.
-            laws: The laws of the coupling then, where any were made.
-            contacts: The records of `observers.contacts` then, which count from first touch.
-            fields: The items of `observers.fields.records` then.
+            kept: The run after these load steps.
         """
-        self.steps, self.position = list(steps), position
-        self.coupling.start, self.coupling.table = state, laws
-        self.observers.contacts.records = list(contacts)
-        self.observers.fields.records = dict(fields)
-        self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
+        self.steps, self.position = list(kept.steps), kept.position
+        self.coupling.start = kept.state
+        if kept.laws:
+            from patchlaw.multiscale.laws.law_table import read_laws
+
+            self.coupling.table = read_laws(BytesIO(kept.laws))
+        self.observers.contacts.records = list(kept.contacts)
+        self.observers.fields.records = dict(kept.fields)
+        self._notes += [
+            f"resumed after load step {len(kept.steps)}; phase times are those since then"
+        ]
 
     @property
     def laws(self) -> LawTable | None:
@@ -278,11 +291,13 @@ class Run:
         accuracy = verdict(steps, self.given.accuracy, coupling.about.unmeasured())
         notes = [] if accuracy is None else [accuracy.sentence]
         notes += coupling.about.notes(self.steps)
+        notes += self._notes
+        notes += chain.from_iterable(one.notes(self.steps) for one in self.observers)
         history = History(
             steps=steps,
             patches=coupling.parts.regions or coupling.parts.patches,
             seconds=self.clock.times,
-            notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
+            notes=tuple(notes),
             accuracy=accuracy,
             reference=record,
             contact_records=tuple(self.observers.contacts.records),
@@ -299,7 +314,8 @@ class Run:
         Note:
             Collective.
         """
-        self.observers.release()
+        for one in self.observers:
+            one.release()
         self.coupling.release()
 
 

@@ -1,7 +1,7 @@
 """Runs that leave a checkpoint on their way, and runs that go on from it."""
 
 from patchlaw.multiscale import Run
-from patchlaw.multiscale.runs.output.results_folder import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from patchlaw.support.files import write_record
 
 
@@ -10,13 +10,12 @@ def ran_past(scene, step, path):
     whole = Run(scene)
     for each in whole.load_steps():
         if each.step == step:
-            write_record(path, checkpoint_of(whole, whole.coupling.state()))
+            write_record(path, whole.checkpoint(whole.coupling.state()))
     return whole
 
 
 def gone_on(scene, path):
     """Return the run of a scene from a checkpoint to its end, and the load steps of its own."""
     kept, again = read_checkpoint(path), Run(scene)
-    past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
-    again.resume(*past, kept.fields)
+    again.resume(kept)
     return again, list(again.load_steps())

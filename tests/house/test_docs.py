@@ -12,7 +12,7 @@ import pytest
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.laws.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE
 from patchlaw.multiscale.runs.output.results import FILES
@@ -61,12 +61,7 @@ def test_every_map_of_a_contact_is_in_the_table(generated):
 
 
 def columns_of_a_reference():
-    none = np.zeros((1, 0))
-    estimate = Estimate(value=none[0], error=none[0], rate=none[0])
-    record = ReferenceRecord(
-        sizes=np.ones(1), unknowns=(1,), approach_mm=none, force_N=none,
-        contact_area_fraction=none, approach=estimate, force=estimate, area=estimate,
-    )  # fmt: skip
+    record = ReferenceRecord.of([], np.ones(1), (1,), force_order=2.0)
     return tuple(record.columns(()))
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
+from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, find_checkpoint
 from patchlaw.support.files import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
@@ -223,7 +223,7 @@ def whole(folder):
             places[step.step] = folder / f"after {step.step}"
             places[step.step].mkdir()
             path = places[step.step] / FILE_NAME
-            write_record(path, checkpoint_of(whole, whole.coupling.state()))
+            write_record(path, whole.checkpoint(whole.coupling.state()))
     return whole, places
 
 
@@ -245,7 +245,7 @@ def test_a_run_goes_on_within_stages(folder, whole):
     scene, (first, places) = bolted(folder), whole
     for place in places.values():
         again, kept = Run(scene), find_checkpoint(place, scene)
-        again.resume(kept.steps, kept.position, kept.state, kept.table)
+        again.resume(kept)
         list(again.load_steps())
         assert len(again.steps) == 12, place
         # Newton's residual

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 
 from patchlaw.geometry import PatchGrid, Surface
@@ -23,8 +23,6 @@ have a colour of their own."""
 _STICK_TO_SLIP = LinearSegmentedColormap.from_list(
     "stick to slip", [style.BLUE, "0.9", style.VERMILLION]
 )
-_STICK, _SLIP = 1.0, 2.0
-"""Values of cells that stick and slip in their map; open ones are masked."""
 
 
 def load_text(step: Any) -> str:
@@ -80,10 +78,15 @@ def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
     draw_gaps(gaps, record, scales.gap)
     if yields:
         depths, shares, *others = others
-        _draw_depths(depths, record, scales.depth)
-        deeper = "yielded area that is deeper"
-        unit = usual_unit([scales.depth], "mm")
-        _draw_shares(shares, record.plastic_depth_mm, "plastic depth", unit, deeper)
+        depth, unit = np.asarray(record.plastic_depth_mm), usual_unit([scales.depth], "mm")
+        most = f", at most {number(float(depth.max()) / unit[1], 3)} {unit[0]}" * bool(depth.any())
+        if depth.any():
+            _draw_depths(depths, record, depth, scales.depth, "plastic depth")
+        else:
+            style.map_axes(depths, record.lengths_mm)
+            style.say(depths, "nothing has yielded")
+        depths.set_title("plastic depth" + most)
+        _draw_shares(shares, depth, "plastic depth", unit, "yielded area that is deeper")
     return figure, others
 
 
@@ -104,23 +107,20 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
     if record.pressure_MPa is None:
         _draw_spots(axes, record, scales)
         return
-    unit, size = scales.pressure_unit
-    pressure = np.asarray(record.pressure_MPa)
-    peak, top, colours = float(np.max(pressure)), scales.pressure, style.PRESSURES
-    title = f"contact pressure, at most {number(peak / size, 3)} {unit}"
+    unit = scales.pressure_unit
+    pressure, colours = np.asarray(record.pressure_MPa), style.PRESSURES
+    peak, top = float(np.max(pressure)), scales.pressure
+    title = f"contact pressure, at most {number(peak / unit[1], 3)} {unit[0]}"
     alike = pressure >= (1.0 - _SAME) * peak
     at_most = np.count_nonzero(alike) / np.count_nonzero(pressure > 0.0)
     if record.plastic_depth_mm is not None and at_most > _MANY:
         # they bear the hardness: their colour says so, and others have the scale
-        colours, pressure = (
-            style.PRESSURES.with_extremes(over=YIELDED),
-            np.where(alike, 2 * top, pressure),
-        )
+        colours, pressure = colours.with_extremes(over=YIELDED), np.where(alike, 2 * top, pressure)
         share = f"{percent(at_most, 2)} of the contact, in grey,"
-        title = f"{share} bears {number(peak / size, 3)} {unit}"
-    shown = np.ma.masked_less_equal(pressure / size, 0.0)
-    image = _draw_field(axes, record, shown, colours, Normalize(0.0, top / size), largest=True)
-    style.colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
+        title = f"{share} bears {number(peak / unit[1], 3)} {unit[0]}"
+    look: dict[str, Any] = {"ends": (0.0, top), "cmap": colours, "extend": "max"}
+    shown = np.ma.masked_less_equal(pressure, 0.0)
+    style.draw_image(axes, record, shown, "contact pressure", unit, **look)
     axes.set_title(title)
 
 
@@ -133,48 +133,17 @@ def draw_gaps(axes: Any, record: Any, top: float) -> None:
         top: Gap of the darkest colour [mm].
     """
     closed = np.asarray(record.pressure_MPa) > 0.0
-    unit, size = usual_unit([top], "mm")
-    shown = np.ma.masked_where(closed, np.maximum(np.asarray(record.gap_mm) / size, 0.0))
-    scale = Normalize(0.0, top / size or 1.0)
+    shown = np.ma.masked_where(closed, np.maximum(np.asarray(record.gap_mm), 0.0))
     colours = style.GAPS.with_extremes(bad=style.VERMILLION)  # not behind what no triangle covers
-    image = _draw_field(axes, record, shown, colours, scale, largest=False)
-    style.colour_bar(image, axes, f"gap [{unit}]")
+    look: dict[str, Any] = {"ends": (0.0, top), "cmap": colours, "largest": False}
+    style.draw_image(axes, record, shown, "gap", usual_unit([top], "mm"), **look)
     axes.set_title("gap; contact in orange" if closed.any() else "gap; no contact")
 
 
-def _draw_depths(axes: Any, record: Any, top: float) -> None:
-    depth = np.asarray(record.plastic_depth_mm)
-    if not depth.any():
-        style.map_axes(axes, record.lengths_mm)
-        style.say(axes, "nothing has yielded")
-        axes.set_title("plastic depth")
-        return
-    unit, size = usual_unit([top], "mm")
-    shown = np.ma.masked_less_equal(depth / size, 0.0)
-    image = _draw_field(axes, record, shown, style.DEPTHS, Normalize(0.0, top / size), largest=True)
-    style.colour_bar(image, axes, f"plastic depth [{unit}]")
-    axes.set_title(f"plastic depth, at most {number(float(depth.max()) / size, 3)} {unit}")
-
-
-def _draw_field(
-    axes: Any, record: Any, values: Any, colours: Any, scale: Any, *, largest: bool
-) -> Any:
-    """Draw a field of cells as an image, one of nodes as triangles between them."""
-    look: dict[str, Any] = {"cmap": colours, "norm": scale}
-    if values.ndim == 2:
-        return style.draw_image(axes, record.lengths_mm, values, largest=largest, **look)
-    unit = style.map_axes(axes, record.lengths_mm)
-    from matplotlib.tri import Triangulation
-
-    mesh = Triangulation(unit * record.x_mm, unit * record.y_mm)
-    whole = values[mesh.triangles]
-    # a triangle belongs to the contact as soon as one of its nodes does
-    filled = (
-        whole.max(axis=1)
-        if largest
-        else np.ma.masked_where(np.ma.getmaskarray(whole).any(axis=1), whole.mean(axis=1))
-    )
-    return axes.tripcolor(mesh, facecolors=filled, rasterized=True, **look)
+def _draw_depths(axes: Any, place: Any, depth: Any, top: float, what: str) -> None:
+    """Draw depths by which heights are lower."""
+    shown, unit = np.ma.masked_less_equal(depth, 0.0), usual_unit([top], "mm")
+    style.draw_image(axes, place, shown, what, unit, ends=(0.0, top), cmap=style.DEPTHS)
 
 
 def _draw_spots(axes: Any, record: Any, scales: Any) -> None:
@@ -322,19 +291,12 @@ def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     title = f"load step {record.step}: worn over {usual(slid, 'mm')}"
     figure, (new, worn, depths, profile) = style.map_panels(lengths, 3, 1, title=title)
     unit, size = usual_unit([float(np.abs(before).max())], "mm")
-    scale = Normalize(float(before.min()) / size, float(before.max()) / size)
     level = after - after.mean()  # as much may have worn off as the roughness is high
+    look: dict[str, Any] = {"ends": (before.min(), before.max()), "cmap": style.HEIGHTS}
     for axes, heights, text in ((new, before, "new"), (worn, level, "worn, over its mean")):
-        image = style.draw_image(
-            axes, lengths, heights / size, largest=False, cmap=style.HEIGHTS, norm=scale
-        )
-        style.colour_bar(image, axes, f"height [{unit}]")
+        style.draw_image(axes, lengths, heights, "height", (unit, size), largest=False, **look)
         axes.set_title(text)
-    name, part = usual_unit([float(depth.max())], "mm")
-    shown = np.ma.masked_less_equal(depth / part, 0.0)
-    norm = Normalize(0.0, float(depth.max()) / part or 1.0)
-    image = style.draw_image(depths, lengths, shown, largest=True, cmap=style.DEPTHS, norm=norm)
-    style.colour_bar(image, depths, f"worn depth [{name}]")
+    _draw_depths(depths, lengths, depth, float(depth.max()), "worn depth")
     volume = float(depth.mean()) * float(np.prod(lengths))
     depths.set_title(f"worn depth, volume {number(volume, 3)} mm³")
     row = int(np.argmax(depth.sum(axis=0)))
@@ -382,26 +344,21 @@ def _draw_lost(axes: Any, history: Any) -> None:
 
 def _draw_cells(axes: Any, record: Any) -> None:
     closed, slipping = record.pressure_MPa > 0.0, record.slipping
-    values = np.where(closed, np.where(slipping, _SLIP, _STICK), 0.0)
-    look: dict[str, Any] = {
-        "cmap": ListedColormap([style.BLUE, style.VERMILLION]),
-        "norm": Normalize(_STICK, _SLIP),
-    }
-    shown = np.ma.masked_equal(values, 0.0)
-    style.draw_image(axes, record.lengths_mm, shown, largest=True, **look)
+    shown = np.ma.masked_where(~closed, np.where(slipping, 1.0, 0.0))
+    two = ListedColormap([style.BLUE, style.VERMILLION])
+    style.draw_image(axes, record, shown, ends=(0.0, 1.0), cmap=two)
     slip = np.count_nonzero(slipping) / max(1, np.count_nonzero(closed))
     axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in orange")
 
 
 def _draw_tractions(axes: Any, record: Any) -> None:
     traction = np.hypot(*record.traction_MPa)
-    unit, size = usual_unit([float(traction.max(initial=0.0))], "MPa")
-    shown = np.ma.masked_where(record.pressure_MPa <= 0.0, traction / size)
+    unit = usual_unit([float(traction.max(initial=0.0))], "MPa")
+    shown = np.ma.masked_where(record.pressure_MPa <= 0.0, traction)
     # few cells carry the largest tractions
-    top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
-    look: dict[str, Any] = {"cmap": style.PRESSURES, "norm": Normalize(0.0, top or 1.0)}
-    image = style.draw_image(axes, record.lengths_mm, shown, largest=True, **look)
-    style.colour_bar(image, axes, f"tangential traction [{unit}]", extend="max")
+    top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else unit[1]
+    look: dict[str, Any] = {"ends": (0.0, top), "cmap": style.PRESSURES, "extend": "max"}
+    style.draw_image(axes, record, shown, "tangential traction", unit, **look)
     axes.set_title("tangential traction")
 
 

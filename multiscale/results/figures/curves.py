@@ -10,11 +10,20 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.loading.column import leak_rates
 from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.figures import style
-from patchlaw.multiscale.results.run_curves import nominal_area, over_pressure, pressure_between
-from patchlaw.support import Array
+from patchlaw.multiscale.results.run_curves import (
+    APPROACH,
+    AREA,
+    OTHERS,
+    PRESSURE,
+    SEPARATION,
+    Quantity,
+    nominal_area,
+    over_pressure,
+    pressure_between,
+)
 
 
 @style.styled()
@@ -28,57 +37,61 @@ def history_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History`.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    figure, (force, area, gap) = style.panels(1, 3, 2.4)
+    figure, panels = style.panels(1, 3, 2.4)
     colour = style.COLOURS.get(kind, style.BLUE)
-    draw_response(force, area, gap, history, {"color": colour, "label": kind})
+    draw_response(panels, history, {"color": colour, "label": kind})
     if history.reference is not None:
-        draw_error_band(force, area, history, colour=colour)
-    label_response(force, area, gap, [history])
+        draw_error_band(panels[0], panels[1], history, colour=colour)
+    label_response(panels, [history])
     if len(history) and history.before is None:
-        area.set_title("small dots: first touch")
+        panels[1].set_title("small dots: first touch")
     style.add_legend(figure)
     return figure
 
 
-def draw_response(force: Any, area: Any, gap: Any, history: Any, look: dict[str, Any]) -> None:
+RESPONSE = ((APPROACH, PRESSURE), (PRESSURE, AREA), (SEPARATION, PRESSURE))
+"""What the panels of a run show along x and y."""
+
+
+def draw_response(panels: Sequence[Any], history: Any, look: dict[str, Any]) -> None:
     """Draw mean pressure, contact area and mean separation at all load steps.
 
     Args:
-        force: Axes of mean pressure [MPa] over approach [µm].
-        area: Axes of contact area [%] over mean pressure [MPa].
-        gap: Axes of mean pressure [MPa] over mean separation [µm].
+        panels: Axes of `RESPONSE`, in the units of `style.DRAWN`.
         history: A `multiscale.results.history.History`.
         look: Look of the points and curves, with their label.
     """
     if not len(history):
         return
-    pressure, nominal = history.mean_pressure_MPa, nominal_area(history)
-    bars: list[Any] = [None] * 4  # of a reference, whose bands are about mesh size zero
+    drawn = {one: _drawn(one, one.values(history)) for pair in RESPONSE for one in pair}
+    bars: dict[Any, Any] = dict.fromkeys(drawn)  # of a reference bands are about mesh size zero
     if history.reference is None:
-        bars = [1e3 * history.approach_error_mm, history.force_error_N / nominal]
-        bars += [100 * history.contact_area_fraction_error, 1e3 * history.mean_separation_error_mm]
-    approach, share = 1e3 * history.approach_mm, 100 * history.contact_area_fraction
+        bars = {one: _drawn(one, one.errors(history)) for one in drawn}
     # under a shear alone all load steps are one point
-    before = np.append(np.nan, pressure[:-1]), np.append(np.nan, approach[:-1])
-    shown = ~(np.isclose(pressure, before[0], 1e-6) & np.isclose(approach, before[1], 1e-6))
-    falls = history.unloading
-    for axes, x, y, errors, over in (
-        (force, approach, pressure, (bars[0], bars[1]), "approach_mm"),
-        (area, pressure, share, (bars[1], bars[2]), ""),
-        (gap, 1e3 * history.mean_separation_mm, pressure, (bars[3], bars[1]), "mean_separation_mm"),
-    ):
-        known = shown & np.isfinite(x) & np.isfinite(y)
-        draw_points(axes, x, y, errors, falls, known, look)
-        between = over and len(history) <= _MOST_POINTS  # of more, points are the curve
-        for index, *curve in pressure_between(history, over) if between else ():
+    alike = (
+        np.isclose(drawn[one], np.append(np.nan, drawn[one][:-1]), 1e-6)
+        for one in (APPROACH, PRESSURE)
+    )
+    shown, falls = ~np.logical_and(*alike), history.unloading
+    for axes, (x, y) in zip(panels, RESPONSE, strict=True):
+        known = shown & np.isfinite(drawn[x]) & np.isfinite(drawn[y])
+        draw_points(axes, drawn[x], drawn[y], (bars[x], bars[y]), falls, known, look)
+        between = y is PRESSURE and len(history) <= _MOST_POINTS  # of more, points are the curve
+        for index, *curve in pressure_between(history, x.column) if between else ():
             line = {"color": look["color"]} | (_FALLING if falls[index] else {})
-            axes.plot(1e3 * curve[0], curve[1], **line)
+            axes.plot(_drawn(x, curve[0]), curve[1], **line)
+    force, area, _ = panels
     if history.before is None:
         area.plot(0.0, 0.0, **_TOUCH, color=look["color"])
         if not any(any(step.tilt) for step in history.steps):
             # the first touch of a tilted plane is not at that of the middle
             force.plot(-1e3 * history.steps[0].zero_mm, 0.0, **_TOUCH, color=look["color"])
-    _say_steps_on_one_point(force, approach, pressure, shown)
+    _say_steps_on_one_point(force, drawn[APPROACH], drawn[PRESSURE], shown)
+
+
+def _drawn(quantity: Quantity, values: Any) -> Any:
+    """Return values in the unit that they are drawn in."""
+    return values / style.DRAWN.get(quantity.unit, 1.0)
 
 
 _MOST_POINTS = 500
@@ -134,27 +147,17 @@ def _say_steps_on_one_point(axes: Any, x: Any, y: Any, shown: Any) -> None:
         axes.annotate(f"steps {start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
 
 
-def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) -> None:
-    """Label axes of mean pressure, contact area and mean separation in units that suit all runs.
+def label_response(panels: Sequence[Any], histories: Sequence[Any]) -> None:
+    """Label panels of `RESPONSE`, or the first of them, in units that suit all runs.
 
     Args:
-        force: Axes of mean pressure over approach.
-        area: Axes of contact area over mean pressure.
-        gap: Axes of mean pressure over mean separation; None for none.
+        panels: Their axes.
         histories: What is drawn.
     """
-    pressures, approaches = (
-        np.concatenate([np.ravel(getattr(history, name)) for history in histories])
-        for name in ("mean_pressure_MPa", "approach_mm")
-    )
-    area.set(ylabel="contact area fraction [%]")
-    for axis in (force.yaxis, area.xaxis):
-        style.show_unit(axis, "mean pressure", "MPa", pressures)
-    style.show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
-    if gap is not None:
-        gaps = np.concatenate([history.mean_separation_mm for history in histories])
-        style.show_unit(gap.yaxis, "mean pressure", "MPa", pressures)
-        style.show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
+    for axes, pair in zip(panels, RESPONSE, strict=False):
+        for axis, one in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+            values = np.concatenate([np.ravel(one.values(history)) for history in histories])
+            style.show_unit(axis, one.text, one.unit, values)
 
 
 @style.styled()
@@ -216,17 +219,10 @@ def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> Non
 
 
 _OVER_SLID = (
-    ("peak_pressure_MPa", "peak pressure", "MPa"),
-    ("mean_pressure_MPa", "mean pressure", "MPa"),
-    ("contact_area_fraction", "contact area", "%"),
-    ("interface_stiffness_MPa_per_mm", "interface stiffness", "MPa/mm"),
-    ("worn_depth_mm", "largest worn depth", "mm"),
-    *(
-        (f"leak_{way}mm3_per_s", f"leak {words}".strip(), "mm³/s")
-        for way, words in (("x_", "along x"), ("y_", "along y"), ("", ""))
-    ),
-)
-"""Columns that are drawn over the distance slid, with their names and units."""
+    "peak_pressure_MPa", "mean_pressure_MPa", "contact_area_fraction",
+    "interface_stiffness_MPa_per_mm", "worn_depth_mm", *(name for name, _ in leak_rates()),
+)  # fmt: skip
+"""Quantities that are drawn over the distance slid."""
 _STAYS, _SPREAD, _FEW = 1e-6, 30.0, 0.2
 """Relative change of what stays as the surfaces slide, such as a mean pressure under a force; ratio
 of values from which on their axis is logarithmic; and median over the largest of distances below
@@ -245,21 +241,23 @@ def wear_figure(history: Any, kind: str) -> Figure:
     """
     slid, colour = np.nan_to_num(history.slid_mm), style.COLOURS.get(kind, style.BLUE)
     worn, unit = slid > 0.0, shown_unit(slid, "mm")
-    column_errors, shown = {column.name: column.error for column in COLUMNS}, []
-    for name, text, of in _OVER_SLID:
-        values = np.asarray(getattr(history, name, np.full(len(slid), np.nan)), float)
+    quantities, shown = {one.name: one for one in (PRESSURE, *OTHERS)}, []
+    for one in map(quantities.__getitem__, _OVER_SLID):
+        values = one.values(history)
         known = values[worn & np.isfinite(values)]
-        if known.size and (name != "mean_pressure_MPa" or np.ptp(known) > _STAYS * known.max()):
-            shown.append((name, values, text, of))
+        if known.size and (one is not PRESSURE or np.ptp(known) > _STAYS * known.max()):
+            shown.append((one, values))
     figure, axes = style.panel_grid(len(shown), 2.3)
-    for place, (name, values, text, of) in zip(axes, shown, strict=True):
-        errors = np.nan_to_num(getattr(history, column_errors[name], 0.0 * slid))
+    for place, (one, values) in zip(axes, shown, strict=True):
+        errors, text, of = np.nan_to_num(one.errors(history)), one.text, one.unit
         if of == "%":  # there is no more than all
             errors = np.minimum(errors, 1.0 - np.nan_to_num(values))
         said, size = shown_unit(values[np.isfinite(values)], of)
         bars = None, errors / size
         look = {"color": colour, "label": kind}
-        place.set(xlabel=f"distance slid [{unit[0]}]", ylabel=f"{text} [{said}]")
+        place.set(
+            xlabel=f"distance slid [{unit[0]}]", ylabel=f"{text.removesuffix(' per area')} [{said}]"
+        )
         known = worn & np.isfinite(values)
         place.plot(slid[known] / unit[1], values[known] / size, color=colour, lw=1.0)
         draw_points(place, slid / unit[1], values / size, bars, ~worn, known, look)
@@ -300,18 +298,15 @@ def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None
     nominal = nominal_area(history)
     approach, pressure = 1e3 * record.approach.value, record.force.value / nominal
     aside, above = 1e3 * record.approach.error, record.force.error / nominal
-    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0}
-    _fill_band(force, approach, pressure, aside, above, label=record.label, **look)
-    if area is not None:
-        share, error = 100 * record.area.value, 100 * record.area.error
-        _fill_band(area, pressure, share, 0.0, error, **look)
-
-
-def _fill_band(axes: Any, x: Array, y: Array, aside: Any, above: Any, **look: Any) -> None:
-    """Fill what lies within errors aside and above of a rising curve."""
-    aside, above = np.nan_to_num(aside), np.nan_to_num(above)
-    around = np.append(x - aside, (x + aside)[::-1]), np.append(y + above, (y - above)[::-1])
-    axes.fill(*around, **look)
+    share, error = 100 * record.area.value, 100 * record.area.error
+    for axes, x, y, beside, up, label in (
+        (force, approach, pressure, aside, above, record.label),
+        (area, pressure, share, 0.0, error, None),
+    ):
+        if axes is not None:
+            off, up = np.nan_to_num(beside), np.nan_to_num(up)
+            around = np.append(x - off, (x + off)[::-1]), np.append(y + up, (y - up)[::-1])
+            axes.fill(*around, color=colour, alpha=0.25, lw=0.0, label=label)
 
 
 @style.styled()
@@ -343,10 +338,9 @@ def law_figure(table: Any) -> Figure:
             pressure.plot(*dots, ".", ms=3, color=colours[index])
     ends = [table.laws[index].range[1] for index in closing]
     tops = [table.laws[index].rows.pressure[-1] for index in closing]
-    area.set(ylabel="contact area fraction [%]")
-    style.show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
-    for axes in (pressure, area):
-        style.show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
+    for axes, one, most in ((pressure, PRESSURE, tops), (area, AREA, [1.0])):
+        style.show_unit(axes.xaxis, "closure", "mm", ends)
+        style.show_unit(axes.yaxis, one.text, one.unit, most)
     if key:
         _draw_places(key[0], table, colours)
     elif len(closing) > 1:
@@ -372,9 +366,8 @@ def _draw_places(axes: Any, table: Any, colours: Any) -> None:
     scale = style.map_axes(axes, patches.lengths)
     is_open = np.array([law.is_open for law in table.laws])
     shown = np.where(is_open[:, None], np.array(to_rgb(style.NO_CONTACT)), colours)
-    borders = scale * patches.borders_x, scale * patches.borders_y
-    mesh = axes.pcolormesh(*borders, np.zeros(patches.grid[::-1]))
-    mesh.set_array(None)
-    by_rows = shown.reshape(*patches.grid, 3).swapaxes(0, 1).reshape(-1, 3)
-    mesh.set(facecolor=by_rows, edgecolor="0.8", linewidth=0.4)
+    extent = (0.0, scale * patches.lengths[0], 0.0, scale * patches.lengths[1])
+    image = shown.reshape(*patches.grid, 3).swapaxes(0, 1)
+    axes.imshow(image, origin="lower", extent=extent)
+    style.draw_patch_borders(axes, patches, colour="0.8")
     axes.set_title("colours by place; open: white")

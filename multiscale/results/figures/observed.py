@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
@@ -106,14 +106,11 @@ def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
     scale, _ = style.map_unit(flow.lengths)
     first, second = section.pressures
     pressure = second + flow.pressure * (first - second)
-    name, unit = usual_unit([first, second], "MPa")
-    contact, fluid = np.ma.masked_greater(flow.gap, 0.0), np.ma.masked_invalid(pressure / unit)
-    grey: dict[str, Any] = {"cmap": ListedColormap([_CONTACT])}
-    style.draw_image(axes, flow.lengths, 0.0 * contact, largest=False, **grey)
-    norm = Normalize(min(first, second) / unit, max(first, second) / unit)
-    blue: dict[str, Any] = {"cmap": _FLUID, "norm": norm}
-    image = style.draw_image(axes, flow.lengths, fluid, largest=False, **blue)
-    style.colour_bar(image, axes, f"fluid pressure [{name}]")
+    contact, fluid = np.ma.masked_greater(flow.gap, 0.0), np.ma.masked_invalid(pressure)
+    grey, ends = ListedColormap([_CONTACT]), (min(first, second), max(first, second))
+    style.draw_image(axes, flow.lengths, 0.0 * contact, largest=False, cmap=grey)
+    unit, look = usual_unit([first, second], "MPa"), {"ends": ends, "cmap": _FLUID}
+    style.draw_image(axes, flow.lengths, fluid, "fluid pressure", unit, largest=False, **look)
     if flow.constriction is None:
         return
     _draw_lines(axes, flow, scale, 1.0 if first > second else -1.0)

@@ -76,7 +76,7 @@ def sweep_figure(sweep: Any) -> Figure:
         area.plot(*mean[1:], lw=2.0, **look)
         if many:
             _draw_scatter(force, statistics, colour, with_median=not several)
-    label_response(force, area, None, [part for _, part in ensembles])
+    label_response((force, area), [part for _, part in ensembles])
     if len(sweep) > len(ensembles):
         median = "" if several else "dashed: median; "
         force.set_title(f"thick: mean{'s' * several}; {median}band{'s' * several}: middle 90 %")
@@ -188,14 +188,14 @@ def difference_figure(both: Any) -> Figure:
     Args:
         both: A `multiscale.runs.difference.Difference`.
     """
-    figure, (force, area, gap, ratios) = style.panels(2, 2, 5.2)
+    figure, (*panels, ratios) = style.panels(2, 2, 5.2)
     colours, marks = (style.BLUE, style.VERMILLION), "os"
     for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
         look: dict[str, Any] = {"color": colour, "label": style.literal(name), "marker": mark}
-        draw_response(force, area, gap, history, look)
-    label_response(force, area, gap, both.histories)
-    gap.locator_params(axis="x", nbins=6)
-    force.legend()
+        draw_response(panels, history, look)
+    label_response(panels, both.histories)
+    panels[2].locator_params(axis="x", nbins=6)
+    panels[0].legend()
     _draw_ratios(ratios, both)
     return figure
 
@@ -232,8 +232,7 @@ def difference_over_pressure_figure(both: Any) -> Figure:
 
 def _draw_ratios(axes: Any, both: Any) -> None:
     """Draw ratios over the load that both have in common, with error bars where these are known."""
-    drawn = 1.0 if both.load.unit == "MPa" else 1e-3
-    load = both.loads / drawn
+    load = both.loads / style.DRAWN.get(both.load.unit, 1.0)
     axes.axhline(1.0, color="0.7", lw=0.8)
     shown = [one for one in both.ratios if one.name in _SHOWN]
     for one, mark in zip(shown, "osD^", strict=False):
@@ -241,7 +240,7 @@ def _draw_ratios(axes: Any, both: Any) -> None:
         axes.plot(load, one.ratio, color=look["color"])
         known = np.isfinite(one.ratio)
         draw_points(axes, load, one.ratio, (None, one.error), np.zeros_like(known), known, look)
-    style.show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads, drawn)
+    style.show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads)
     axes.set(
         ylabel="second over first", title=style.literal(f"{both.names[1]} over {both.names[0]}")
     )

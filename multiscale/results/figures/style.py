@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
+from patchlaw.multiscale.readable import number, power_of_ten, shown_unit, usual_unit
 from patchlaw.support import Array
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
@@ -155,16 +155,7 @@ def new_figure(width: float, height: float) -> Figure:
     return StyledFigure(figsize=(width, height), layout="constrained")
 
 
-def panels(
-    rows: int,
-    columns: int,
-    height: float,
-    *,
-    width: float = FULL_WIDTH,
-    bars: Sequence[int] = (),
-    below: float = MARGINS["below"],
-    title: str = "",
-) -> tuple[Figure, list[Any]]:
+def panels(rows: int, columns: int, height: float, **about: Any) -> tuple[Figure, list[Any]]:
     """Return a figure with panels row by row, whose places are fixed before anything is drawn.
 
     Finding places that suit the labels takes longer than drawing. Here margins have room for labels
@@ -174,14 +165,11 @@ def panels(
         rows: Number of rows.
         columns: Number of columns.
         height: Height of the figure [inch].
-        width: Its width [inch].
-        bars: Numbers of the panels that have a colour bar, from 0.
-        below: Height below a panel for its labels [inch].
-        title: Title of the figure.
+        **about: ``width`` of the figure [inch], `FULL_WIDTH` by default; ``bars``, the numbers of
+            the panels that have a colour bar, from 0; ``below``, height below a panel for its
+            labels [inch]; ``title`` of the figure.
     """
-    rows_ = [(columns, height / rows)] * rows
-    count = rows * columns
-    return _in_rows(rows_, count, width=width, bars=bars, below=below, title=title, height=height)
+    return _in_rows([(columns, height / rows)] * rows, rows * columns, height=height, **about)
 
 
 def panel_grid(
@@ -247,18 +235,18 @@ def map_panels(
         rows = [row(columns, 2.0 * _PANEL_HEIGHT)] + [plain] * -(-left // 2)
     else:
         rows = [row(2) if 2 * k + 1 < maps else plain for k in range(-(-(maps + plots) // 2))]
-    shape: dict[str, Any] = {"width": width, "below": below, "title": title}
-    return _in_rows(rows, maps + plots, bars=range(maps), **shape)
+    look: dict[str, Any] = {"width": width, "below": below, "title": title}
+    return _in_rows(rows, maps + plots, bars=range(maps), **look)
 
 
 def _in_rows(
     rows: Sequence[tuple[int, float]],
     count: int,
     *,
-    width: float,
-    bars: Sequence[int],
-    below: float,
-    title: str,
+    width: float = FULL_WIDTH,
+    bars: Sequence[int] = (),
+    below: float = MARGINS["below"],
+    title: str = "",
     height: float = 0.0,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with rows of panels, of which the number and the height [inch] are given."""
@@ -318,17 +306,20 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) -> None:
+DRAWN = {"mm": 1e-3, "%": 0.01}
+"""Sizes of the units that curves are drawn in, µm and %; others in their own unit."""
+
+
+def show_unit(axis: Any, text: str, unit: str, values: Any) -> None:
     """Label an axis in the unit that suits its values, whatever unit they are drawn in.
 
     Args:
         axis: The x or y axis.
         text: What it shows, without the unit.
-        unit: Unit of the values, mm, N or MPa.
+        unit: Unit of the values, mm, N or MPa, or "%" of shares.
         values: The values.
-        drawn: Size of the unit that they are drawn in.
     """
-    name, size = usual_unit(np.ravel(values).tolist(), unit)
+    (name, size), drawn = shown_unit(np.ravel(values).tolist(), unit), DRAWN.get(unit, 1.0)
     axis.set_label_text(f"{text} [{name}]")
     if size != drawn:
         axis.set_major_formatter(lambda place, _: number(place * drawn / size))
@@ -403,21 +394,54 @@ def map_axes(axes: Any, lengths: tuple[float, float]) -> float:
 
 
 def draw_image(
-    axes: Any, lengths: tuple[float, float], values: Any, *, largest: bool, **look: Any
+    axes: Any,
+    place: Any,
+    values: Any,
+    label: str = "",
+    unit: tuple[str, float] = ("", 1.0),
+    *,
+    ends: tuple[float | None, float | None] = (None, None),
+    largest: bool = True,
+    extend: str = "neither",
+    **look: Any,
 ) -> Any:
-    """Draw a field of cells as a map, on few enough cells to be seen.
+    """Draw a field of cells as an image, one of nodes as triangles, on few enough to be seen.
 
     Args:
         axes: Axes, which become those of a map.
-        lengths: Sides of the face along x and y [mm].
-        values: The field, shape (nx, ny); what is masked is not drawn.
-        largest: Whether blocks of cells show their largest value instead of their mean.
-        **look: Colours and their scale, as `imshow` takes them.
+        place: Sides of the face along x and y [mm], or a contact on nodes, a `ContactRecord`.
+        values: The field, shape (nx, ny) or (n,); what is masked is not drawn.
+        label: What the colour bar says, without the unit; empty draws none.
+        unit: The unit that values are shown in, and its size.
+        ends: Values of the first and of the last colour; those of the field by default.
+        largest: Whether blocks of cells, and triangles, show their largest value instead of their
+            mean.
+        extend: As of `colour_bar`.
+        **look: The colours, as `imshow` takes them.
+
+    Returns:
+        What is drawn, for a colour bar.
     """
-    scale = map_axes(axes, lengths)
-    extent = (0.0, scale * lengths[0], 0.0, scale * lengths[1])
-    shown = coarsened(values, largest=largest).T
-    return axes.imshow(shown, origin="lower", extent=extent, **look)
+    lengths, (name, size) = getattr(place, "lengths_mm", place), unit
+    scale, shown = map_axes(axes, lengths), values / size
+    low, high = (None if one is None else one / size for one in ends)
+    look = {"vmin": low, "vmax": (high or 1.0) if low == 0.0 else high} | look
+    if shown.ndim == 2:
+        extent = (0.0, scale * lengths[0], 0.0, scale * lengths[1])
+        shown = coarsened(shown, largest=largest).T
+        image = axes.imshow(shown, origin="lower", extent=extent, **look)
+    else:
+        from matplotlib.tri import Triangulation
+
+        mesh = Triangulation(scale * place.x_mm, scale * place.y_mm)
+        corners = shown[mesh.triangles]
+        open_ = np.ma.getmaskarray(corners).any(axis=1)
+        # a triangle belongs to the contact as soon as one of its nodes does
+        shown = corners.max(axis=1) if largest else np.ma.masked_where(open_, corners.mean(axis=1))
+        image = axes.tripcolor(mesh, facecolors=shown, rasterized=True, **look)
+    if label:
+        colour_bar(image, axes, f"{label} [{name}]", extend=extend)
+    return image
 
 
 def _drawn_inches(axes: Any) -> tuple[float, float]:

@@ -63,9 +63,9 @@ def draw_surface(
         asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface; None draws none.
     """
-    unit, heights = _centred(surface)
-    image = style.draw_image(axes, surface.lengths, heights, largest=False, cmap=style.HEIGHTS)
-    style.colour_bar(image, axes, f"height over the mean plane [{unit}]")
+    (unit, heights), look = _centred(surface), {"largest": False, "cmap": style.HEIGHTS}
+    label = "height over the mean plane"
+    style.draw_image(axes, surface.lengths, heights, label, (unit, 1.0), **look)
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if patches is not None and 1 < patches.count <= 1024:
         style.draw_patch_borders(axes, patches, colour="white")
@@ -350,28 +350,27 @@ class BlockView:
         ):
             axes.plot(*self.seen(*np.transpose(ends)), **line)
         tick = 0.01 * float(sum(self.size))
-        out_x, out_y = (0.0, -tick, 0.0), (tick, 0.0, 0.0)
-        spots = MaxNLocator(5).tick_values
-        for value in (v for v in spots(0, lx) if 0 <= v <= lx):
-            place = lx - value if self.turned else value
-            self._tick(axes, (place, front, low), out_x, f"{value:g}", "center", "top")
-        for value in (v for v in spots(0, ly) if 0 <= v <= ly):
-            place = ly - value if self.turned else value
-            if place >= front:
-                self._tick(axes, (lx, place, low), out_y, f"{value:g}", "left", "top")
-        for value in (v for v in MaxNLocator(3).tick_values(0, self.depth) if v <= self.depth):
-            self._tick(axes, (0, front, -value), (-tick, 0, 0), f"{value:g}", "right", "center")
+        x, y = (
+            [(value, length - value if self.turned else value) for value in _ticks(length, 5)]
+            for length in self.size
+        )
+        for value, at, out, sides in (
+            *((v, (at, front, low), (0, -tick, 0), ("center", "top")) for v, at in x),
+            *((v, (lx, at, low), (tick, 0, 0), ("left", "top")) for v, at in y if at >= front),
+            *((v, (0, front, -v), (-tick, 0, 0), ("right", "center")) for v in _ticks(-low, 3)),
+        ):
+            axes.plot(*self.seen(*np.transpose([at, np.add(at, out)])), color="0.25", lw=0.7)
+            place = self.seen(*np.add(at, np.multiply(1.6, out)))
+            axes.text(*place, f"{value:g}", fontsize=7, ha=sides[0], va=sides[1])
         for at, text, turn, ha in (
             ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
             ((lx + 9 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
             ((-7.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
         ):
-            px, py = self.seen(*at)
-            axes.text(px, py, text, fontsize=8, rotation=turn, ha=ha, va="center")
+            axes.text(*self.seen(*at), text, fontsize=8, rotation=turn, ha=ha, va="center")
         axes.margins(x=0.08, y=0.06)
 
-    def _tick(self, axes: Any, at: tuple, out: tuple, text: str, ha: str, va: str) -> None:
-        """Draw a tick outwards from a place on an edge, with its value."""
-        axes.plot(*self.seen(*np.transpose([at, np.add(at, out)])), color="0.25", lw=0.7)
-        px, py = self.seen(*np.add(at, np.multiply(1.6, out)))
-        axes.text(px, py, text, fontsize=7, ha=ha, va=va)
+
+def _ticks(length: float, most: int) -> list[float]:
+    """Return round numbers from 0 to a length."""
+    return [one for one in MaxNLocator(most).tick_values(0, length) if 0 <= one <= length]

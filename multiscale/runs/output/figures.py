@@ -325,8 +325,8 @@ class RunFigures:
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.parts.materials.first.poisson_ratio
                 figures["block"] = "surface.contact_block", (surface, contact, ratio)
-        for name, function, of in run.observers.figures(history):
-            figures[name] = function, of
+        for one in run.observers:
+            figures |= {name: (what, of) for name, what, of in one.figures(history)}
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
         if run.scene.output.report:

@@ -19,7 +19,6 @@ from patchlaw.multiscale.models.measured_errors.errors import MEANINGS
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
-    counted,
     duration,
     measured,
     number,
@@ -104,13 +103,10 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
     """Return pictures and captions of contacts, and the number of that of the largest force."""
     known = shown_contacts(history.contact_records)
     known = [one for one in known if f"{CONTACT_OF_STEP}{one.step}.png" in pictures]
-    contacts = []
-    for record in known:
-        way = "unloading" if record.unloading else "loading"
-        spots = counted(len(record.spots), "spot") if record.force_N > 0.0 else "no contact"
-        load = f"{usual(record.approach_mm, 'mm')}, force {usual(record.force_N, 'N')}"
-        caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
-        contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
+    contacts = [
+        (f"{CONTACT_OF_STEP}{one.step}.png", f"{one.title[0].upper()}{one.title[1:]}.")
+        for one in known
+    ]
     forces = [record.force_N for record in known]
     return {"contacts": contacts, "first_contact": forces.index(max(forces)) if forces else 0}
 
@@ -171,7 +167,8 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", usual(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    yield from ((name, value, "") for name, value in run.observers.results(last))
+    for one in run.observers:
+        yield from ((name, value, "") for name, value in one.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
             yield column.in_report, measured(value, column.error_of(last), column.unit), ""

@@ -282,7 +282,8 @@ def _dump_fields(run: Run, path: Path) -> None:
     """Write fields; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
     try:
         run.observers.fields.write(path, run.steps, finished=run.finished)
-        run.observers.write_files(path.parent)
+        for one in run.observers:
+            one.write_files(path.parent)
     except (OSError, RuntimeError) as error:
         if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
             raise

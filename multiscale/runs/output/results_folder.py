@@ -12,11 +12,9 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from hashlib import sha256
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from patchlaw.geometry import Control, ShearControl, ShearState
 from patchlaw.micro import RigidPlane, Start
@@ -24,7 +22,7 @@ from patchlaw.multiscale.loading.column import Leak, Mode
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
-from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.multiscale.runs.scene_run import LAYOUT, Checkpoint, Run
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
     GONE,
@@ -38,9 +36,6 @@ from patchlaw.multiscale.scene.scene import (
 )
 from patchlaw.support import InputError, NotWritten, on_root
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
-
-if TYPE_CHECKING:  # only laws take it
-    from patchlaw.multiscale.laws.law_table import LawTable
 
 _LOCK = ".lock"
 _OUTPUT = "output."
@@ -211,49 +206,11 @@ class FolderLock:
 
 
 FILE_NAME = "checkpoint.state"
-LAYOUT = 3
-"""Counts what states of models hold: higher, whenever the same version reads others than before."""
 
 LEAST_INTERVAL = 1.0
 """Least wall time between two writes [s]; a kill loses the load steps of this time."""
 LEAST_RATIO = 20.0
 """Least wall time between two writes over that of a write; so writing takes 5 % at most."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Checkpoint:
-    """A run between two load steps. Nothing in it depends on the number of ranks.
-
-    Attributes:
-        layout: The `LAYOUT` that it was written in.
-        identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
-        resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
-        laws: Bytes of the law file; empty without laws.
-        steps: The accepted load steps.
-        position: Where the load history has come to.
-        state: What the coupling's next load step starts from.
-        contacts: The contacts recorded so far.
-        fields: What makes the states of fields so far again, as numbers of load steps and records.
-    """
-
-    layout: int
-    identity: dict[str, Any]
-    resolved: dict[str, Any]
-    laws: bytes
-    steps: tuple[LoadStep, ...] = ()
-    position: Position
-    state: Any
-    contacts: tuple[ContactRecord, ...] = ()
-    fields: tuple[tuple[int, Any], ...] = ()
-
-    @property
-    def table(self) -> LawTable | None:
-        """The laws; None without."""
-        if not self.laws:
-            return None
-        from patchlaw.multiscale.laws.law_table import read_laws
-
-        return read_laws(BytesIO(self.laws))
 
 
 def _kinds() -> tuple[type, ...]:
@@ -265,31 +222,6 @@ def _kinds() -> tuple[type, ...]:
     own = Checkpoint, Control, Position, LoadStep, Mode, ContactRecord, Leak, PatchState
     of_states = DenseState, LawPoint, RigidPlane, ShearControl, ShearState, Start
     return *own, *of_states, SliderRecord, SliderState
-
-
-def checkpoint_of(run: Run, state: Any) -> Checkpoint:
-    """Return all that is needed to go on with a run from its latest load step.
-
-    Args:
-        run: The run.
-        state: What `Coupling.state` returned.
-    """
-    laws = b""
-    if run.coupling.table is not None:
-        from patchlaw.multiscale.laws.law_table import law_bytes
-
-        laws = law_bytes(run.coupling.table)
-    return Checkpoint(
-        layout=LAYOUT,
-        identity=run.identity,
-        resolved=run.resolved,
-        laws=laws,
-        steps=tuple(run.steps),
-        position=run.position,
-        state=state,
-        contacts=tuple(run.observers.contacts.records),
-        fields=tuple(run.observers.fields.records.items()),
-    )
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -363,7 +295,7 @@ class CheckpointWriter:
         run, state = self._run, self._run.coupling.state()
 
         def keep() -> None:
-            self._pending = checkpoint_of(run, state)
+            self._pending = run.checkpoint(state)
             self._write(self._due)
 
         on_root(run.comm, keep)

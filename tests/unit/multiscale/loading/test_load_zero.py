@@ -148,7 +148,7 @@ def test_a_run_goes_on_from_a_checkpoint():
     steps = half.load_steps()
     next(steps), next(steps)
     again = Run(given)
-    again.resume(half.steps, half.position, half.coupling.state(), half.coupling.table)
+    again.resume(half.checkpoint(half.coupling.state()))
     assert [step.force_N for step in again.load_steps()] == pytest.approx(known[2:], rel=1e-12)
     np.testing.assert_allclose(again.history().approach_mm, whole.history().approach_mm, atol=0.0)
 

@@ -205,17 +205,15 @@ def test_fields_are_those_of_the_body(fields):
     assert np.abs(found.displacement_mm[:, ~bottom]).max() > 1e-4
 
 
-@pytest.mark.parametrize("name", ["fields.xdmf", "fields.h5"])
-def test_fields_that_are_cut_short_are_refused(fields, tmp_path, name):
-    for path in (fields[1] / "fields.xdmf", fields[1] / "fields.h5"):
-        content = path.read_bytes()
-        (tmp_path / path.name).write_bytes(content[: len(content) // (1 + (path.name == name))])
-    with pytest.raises(InputError, match=r"fields\.xdmf: cannot be read with fields\.h5 beside it"):
+def test_fields_that_are_cut_short_are_refused(fields, tmp_path):
+    content = (fields[1] / "fields.h5").read_bytes()
+    (tmp_path / "fields.h5").write_bytes(content[: len(content) // 2])
+    with pytest.raises(InputError, match=r"fields\.h5: cannot be read"):
         read_fields(tmp_path)
 
 
 def test_run_without_fields_has_none(cycle):
-    with pytest.raises(InputError, match=r"fields\.xdmf: there are no fields .*output\.fields"):
+    with pytest.raises(InputError, match=r"fields\.h5: there are no fields .*output\.fields"):
         read_fields(cycle[1])
-    with pytest.raises(InputError, match=r"counter_fields\.xdmf: there are no fields"):
+    with pytest.raises(InputError, match=r"counter_fields\.h5: there are no fields"):
         read_fields(cycle[1], counter=True)

@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw import NotConverged
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.runs.output.results_folder import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from patchlaw.support.files import write_record
 
 SCENE = {
@@ -61,10 +61,10 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     steps = first.load_steps()
     for _ in range(3):
         next(steps)
-    path = write_record(tmp_path / "checkpoint.state", checkpoint_of(first, first.coupling.state()))
+    path = write_record(tmp_path / "checkpoint.state", first.checkpoint(first.coupling.state()))
     last = next(steps)
     kept, again = read_checkpoint(path), Run(scene)
-    again.resume(kept.steps, kept.position, kept.state, kept.table)
+    again.resume(kept)
     (resumed,) = again.load_steps()
     # Newton's iteration ends at 1e-9 of the load
     assert resumed.approach_mm == pytest.approx(last.approach_mm, rel=1e-8)

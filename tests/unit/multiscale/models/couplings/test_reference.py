@@ -12,7 +12,7 @@ import pytest
 
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.results.accuracy import reference_record
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.figures.contact import pressure_figure
 from patchlaw.multiscale.results.figures.curves import history_figure
 from patchlaw.support import InputError
@@ -53,14 +53,14 @@ def test_support_bears_the_force(history):
 
 def test_finest_mesh_is_the_history_and_meshes_differ(history):
     record = history.reference
-    assert np.array_equal(record.force_N[-1], history.force_N)
+    assert np.array_equal(record.force.meshes[-1], history.force_N)
     fraction = history.contact_area_fraction  # but for the order of its sum
-    np.testing.assert_allclose(record.contact_area_fraction[-1], fraction, rtol=1e-14)
+    np.testing.assert_allclose(record.area.meshes[-1], fraction, rtol=1e-14)
     assert np.all(np.diff(record.sizes) < 0.0)
     assert np.all(np.diff(record.unknowns) > 0)
-    assert np.all(record.approach_mm == history.approach_mm)
+    assert np.all(record.approach.meshes == history.approach_mm)
     assert np.all(record.approach.error == 0.0)
-    assert np.all(np.ptp(record.force_N, axis=0) > 0.0)
+    assert np.all(np.ptp(record.force.meshes, axis=0) > 0.0)
     assert np.all(record.force.error > 0.0)
 
 
@@ -89,7 +89,7 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
     assert len(area.patches) == 1
     alone = replace(
         history,
-        reference=reference_record(
+        reference=ReferenceRecord.of(
             [replace(step, meshes=step.meshes[-1:]) for step in history],
             history.reference.sizes[-1:],
             history.reference.unknowns[-1:],
@@ -140,7 +140,7 @@ def test_large_changes_of_the_force_are_halved_on_all_meshes():
         )
     )
     assert len(history) > 2
-    assert history.reference.force_N.shape == (2, len(history))
+    assert history.reference.force.meshes.shape == (2, len(history))
     assert np.all(history.tilt_x == 0.001)
 
 
@@ -306,6 +306,6 @@ def test_patches_without_a_node_are_closed_like_the_nearest():
 
 
 def test_record_of_no_step():
-    record = reference_record([], np.array([2.0, 1.0]), (10, 20), force_order=2.0)
+    record = ReferenceRecord.of([], np.array([2.0, 1.0]), (10, 20), force_order=2.0)
     assert record.label == "no error bar"
     assert record.sentence.startswith("no load step")

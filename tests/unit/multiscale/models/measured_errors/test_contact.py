@@ -21,7 +21,6 @@ from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, er
 from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.runs.output.results import write_results
-from patchlaw.multiscale.runs.output.results_folder import checkpoint_of
 from patchlaw.support import NotConverged
 
 
@@ -357,10 +356,10 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     whole = Run(scene("concurrent"))
     steps = whole.load_steps()
     next(steps)
-    kept = checkpoint_of(whole, whole.coupling.state())
+    kept = whole.checkpoint(whole.coupling.state())
     list(steps)
     again = Run(scene("concurrent"))
-    again.resume(kept.steps, kept.position, kept.state, kept.table)
+    again.resume(kept)
     list(again.load_steps())
     assert again.steps[-1].errors == whole.steps[-1].errors
 

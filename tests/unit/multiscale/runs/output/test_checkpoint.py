@@ -19,7 +19,6 @@ from patchlaw.multiscale.runs.output.results import write_fields
 from patchlaw.multiscale.runs.output.results_folder import (
     CheckpointWriter,
     FolderLock,
-    checkpoint_of,
     find_checkpoint,
     read_checkpoint,
 )
@@ -84,7 +83,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():
         path = tmp_path / f"{step.step}.h5"
-        write_record(path, checkpoint_of(whole, whole.coupling.state()))
+        write_record(path, whole.checkpoint(whole.coupling.state()))
     count = len(whole.steps)
     assert count >= 3
     wanted = columns(whole.steps)
@@ -95,7 +94,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     for done in (1, count - 1):
         again = Run(whole.scene)
         kept = read_checkpoint(tmp_path / f"{done}.h5")
-        again.resume(kept.steps, kept.position, kept.state, kept.table)
+        again.resume(kept)
         list(again.load_steps())
         off = np.abs(columns(again.steps) - wanted)
         assert np.all(off <= (0.0 if exact else 1e-10) * scale)
@@ -106,7 +105,7 @@ def test_checkpoint_keeps_every_bit(tmp_path):
     load = {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}
     run = Run(scene(CUBE | {"load": load, "output": {"check": "last"}}))
     list(run.load_steps())
-    kept = checkpoint_of(run, run.coupling.state())
+    kept = run.checkpoint(run.coupling.state())
     found = read_checkpoint(write_record(tmp_path / "c.h5", kept))
     assert (found.identity, found.resolved) == (kept.identity, kept.resolved)
     assert (found.position, found.laws) == (kept.position, kept.laws)
@@ -154,7 +153,7 @@ def resumed(folder, changed):
     if found is None:
         return None
     run = Run(changed, stated=changed.with_(found.resolved))
-    run.resume(found.steps, found.position, found.state, found.table, found.contacts)
+    run.resume(found)
     return run
 
 
@@ -523,7 +522,7 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     left_open = Scene.from_dict(data)
     whole = Run(left_open)
     next(steps := whole.load_steps())
-    path = write_record(tmp_path / "c.h5", checkpoint_of(whole, whole.coupling.state()))
+    path = write_record(tmp_path / "c.h5", whole.checkpoint(whole.coupling.state()))
     list(steps)
     kept = read_checkpoint(path)
 
@@ -532,6 +531,6 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     again = Run(left_open, stated=left_open.with_(kept.resolved))
     assert again.scene == whole.scene
     assert again.coupling.parts.micro.surface.grid == whole.coupling.parts.micro.surface.grid
-    again.resume(kept.steps, kept.position, kept.state, kept.table)
+    again.resume(kept)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

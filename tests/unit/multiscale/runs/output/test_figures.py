@@ -217,6 +217,12 @@ def test_unloading_is_dashed():
     assert history_figure(rising, "mine").axes[0].get_legend() is None
 
 
+def test_load_steps_without_any_force_stand_at_zero():
+    """No force tells the nominal area then, which pressures refer to."""
+    force = history_figure(loaded([(0.0, 1e-3), (0.0, 2e-3)], None), "mine").axes[0]
+    np.testing.assert_allclose(force.lines[0].get_xydata(), [(1.0, 0.0), (2.0, 0.0)])
+
+
 def test_nothing_is_drawn_between_load_steps_where_nothing_is_known():
     force, area, _ = history_figure(loaded(CYCLE, None), "mine").axes
     for axes in (force, area):  # first touch and points alone
