@@ -35,6 +35,7 @@ Parts = dict[Offset, NDArray[np.floating]]
 _PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
 """Order in which cells are relaxed: those of the first two and of the last two, on the finest grid,
 have no links among themselves."""
+_BETWEEN, _SOLVED = _PARITIES[:2], _PARITIES[2:]
 _HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
 """Half of the neighbours of a cell; links to the others are the same, seen from there."""
 _SHARE = 1e-5
@@ -165,12 +166,14 @@ def potentials(
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
     for count in range(_MOST_ITERATIONS):
         changes = iteration.step()
-        if count and (changes <= _TOLERANCE * np.maximum(iteration.flow, least)).all():
-            found = iteration.potential
+        if not count or (changes > _TOLERANCE * np.maximum(iteration.flow, least)).any():
+            continue
+        left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
+        if (left <= np.maximum(iteration.flow, least)).all():
+            found = iteration.potential()
             flow = _power(source, 1.0 - found) + _power(sink, found)
             for offset, link in links.items():
                 flow += _power(link, found - _at(found, offset))
-            left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
             if (left <= flow).all():
                 return found[:, kept[0]][:, :, kept[1]], flow
     return None
@@ -286,10 +289,10 @@ class _Grid:
         self.diagonal, half = split(diagonal), {key: split(one) for key, one in links.items()}
         self.links = _both_ways(half)
         self.shape = self.diagonal[0, 0].shape
-        inverse = {one: self._over(1.0, self.diagonal[one], one) for one in _PARITIES}
-        self.weights = self._weights(inverse)
+        self.inverse = {one: self._over(1.0, self.diagonal[one], one) for one in _PARITIES}
+        self.weights = self._weights(self.inverse)
         self.found, self._work = _Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
-        self._inverse = {one: values.astype(np.float32) for one, values in inverse.items()}
+        self._inverse = {one: values.astype(np.float32) for one, values in self.inverse.items()}
         low = {
             key: {one: link.astype(np.float32) for one, link in parts.items()}
             for key, parts in half.items()
@@ -388,8 +391,10 @@ class _Grid:
 
     def before(self, right: Parts) -> NDArray[np.floating]:
         """Relax all cells once, from zero, and return the residual of the next coarser grid."""
-        for count, parity in enumerate(_PARITIES):
-            self._relax(right, parity, () if parity in self._first else _PARITIES[:count])
+        done: list[Offset] = []
+        for parity in right:
+            self._relax(right, parity, () if parity in self._first else done)
+            done.append(parity)
         coarse = None
         for count, parity in enumerate(_PARITIES[: -len(self._last)]):
             residual = self._from(parity, _PARITIES[count + 1 :])  # as later ones came after it
@@ -406,11 +411,14 @@ class _Grid:
         """Add the change that a coarser grid found, and relax all cells once in reverse order."""
         wide, (_, nx, ny) = _wide(change), self.shape
         for parity in _PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
+            own = self.found.own[parity]
+            if parity not in right:
+                own[:] = 0.0
             for (i, j), weight in self._low_weights[parity]:
                 beside = wide[:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
-                self.found.own[parity] += np.multiply(weight, beside, out=self._work)
+                own += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
-        for parity in _PARITIES[::-1]:
+        for parity in reversed(right):
             self._relax(right, parity, _PARITIES)
 
 
@@ -469,7 +477,10 @@ def _inverse(links: Parts, diagonal: Array) -> Array:
 
 
 class _Iteration:
-    """Conjugate gradients from the potential 0.
+    """Conjugate gradients for the potentials of every second cell, from 0.
+
+    The cells between, of the first two parities, have links to these and to terminals alone, and
+    their potentials are those that balance them.
 
     Args:
         cycle: Preconditioner, whose finest grid is the problem.
@@ -481,45 +492,59 @@ class _Iteration:
 
     def __init__(self, cycle: _Cycle, source: Array) -> None:
         self._cycle, self._grid = cycle, cycle.grids[0]
-        self._residual = np.stack([source[:, i::2, j::2] for i, j in _PARITIES], axis=1)
-        self._potential = np.zeros_like(self._residual)
-        self._along, self._out = _Cells(self._grid.shape, float), np.empty_like(self._residual)
         shape = self._grid.shape
-        self._right: Parts = {one: np.empty(shape, np.float32) for one in _PARITIES}
-        self._step, self._work = {one: np.empty(shape) for one in _PARITIES}, np.empty(shape)
-        self._before, self.flow = np.zeros(len(source)), source.sum(axis=(1, 2))
-        self._changes: list[Array] = []
+        self._source = {(i, j): source[:, i::2, j::2] for i, j in _PARITIES}
+        self._along, self._work = _Cells(shape, float), np.empty(shape)
+        self.flow = source.sum(axis=(1, 2))
+        self._balance(self._source)
+        for one in _BETWEEN:
+            self.flow -= np.einsum("nxy,nxy->n", self._source[one], self._along.own[one])
+        self._residual = {one: self._into(one) + self._source[one] for one in _SOLVED}
+        self._potential = {one: np.zeros(shape) for one in _SOLVED}
+        self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
+        self._before, self._changes = np.zeros(len(source)), list[Array]()
+
+    def _into(self, parity: Offset) -> Array:
+        """Return what flows into cells of a parity from their neighbours, themselves at 0."""
+        beside, total = self._along.beside[parity], np.zeros(self._grid.shape)
+        for key, link in self._grid.links[parity].items():
+            total += np.multiply(link, beside[key], out=self._work)
+        return total
+
+    def _balance(self, source: Parts | None = None) -> None:
+        """Let potentials between those of the others balance what flows, and comes from sources."""
+        for one in _BETWEEN:
+            into = self._into(one)
+            if source is not None:
+                into += source[one]
+            np.multiply(into, self._grid.inverse[one], out=self._along.own[one])
+            self._along.wrap(one)
 
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
-        residual, along, grid = self._residual, self._along, self._grid
-        scale = np.maximum(residual.max(axis=(1, 2, 3)), -residual.min(axis=(1, 2, 3)))
+        residual, along = self._residual, self._along
+        scale = np.max([np.abs(one).max(axis=(1, 2)) for one in residual.values()], axis=0)
         scale = scale[:, None, None] + np.finfo(float).tiny
-        for k, one in enumerate(_PARITIES):
-            np.divide(residual[:, k], scale, out=self._right[one], casting="same_kind")
+        for one, right in self._right.items():
+            np.divide(residual[one], scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
-        now, work = np.zeros(len(scale)), self._work
-        for k, one in enumerate(_PARITIES):
-            np.multiply(guess[one], scale, out=self._step[one])
-            now += np.einsum("nxy,nxy->n", residual[:, k], self._step[one])
+        steps = {one: guess[one] * scale for one in _SOLVED}
+        now = _product(residual, steps)
         again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
         self._before = now
-        for one in _PARITIES:
+        for one, step in steps.items():
             own = along.own[one]
             own *= again[:, None, None]
-            own += self._step[one]
+            own += step
             along.wrap(one)
-        power = np.zeros_like(now)
-        for k, one in enumerate(_PARITIES):
-            out = np.multiply(grid.diagonal[one], along.own[one], out=self._out[:, k])
-            for key, link in grid.links[one].items():
-                out -= np.multiply(link, along.beside[one][key], out=work)
-            power += np.einsum("nxy,nxy->n", along.own[one], out)
+        self._balance()
+        out = {one: self._grid.diagonal[one] * along.own[one] - self._into(one) for one in _SOLVED}
+        power = _product(out, along.own)
         length = np.divide(now, power, out=np.zeros_like(now), where=power > 0.0)
-        for k, one in enumerate(_PARITIES):
-            part = np.multiply(along.own[one], length[:, None, None], out=work)
-            self._potential[:, k] += part
-            residual[:, k] -= np.multiply(self._out[:, k], length[:, None, None], out=work)
+        for one in _SOLVED:
+            by = length[:, None, None]
+            self._potential[one] += np.multiply(along.own[one], by, out=self._work)
+            residual[one] -= np.multiply(out[one], by, out=self._work)
         self._changes.append(length * now)
         self.flow = self.flow - self._changes[-1]
         last = max(2, len(self._changes) // 4)
@@ -528,13 +553,23 @@ class _Iteration:
     @property
     def imbalance(self) -> Array:
         """Sum of the absolute differences of what enters and leaves all cells, shape (n,)."""
-        return np.asarray(np.abs(self._residual).sum(axis=(1, 2, 3)))
+        return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in self._residual.values()))
 
-    @property
     def potential(self) -> Array:
-        """The potential of all cells, shape (n, nx, ny)."""
-        count, _, nx, ny = self._potential.shape
-        found = np.empty((count, 2 * nx, 2 * ny))
-        for k, (i, j) in enumerate(_PARITIES):
-            found[:, i::2, j::2] = self._potential[:, k]
+        """Return the potential of all cells, shape (n, nx, ny)."""
+        count, nx, ny = self._grid.shape
+        found, along = np.empty((count, 2 * nx, 2 * ny)), self._along
+        self._along = _Cells(self._grid.shape, float)
+        for one, values in self._potential.items():
+            self._along.own[one][:] = values
+            self._along.wrap(one)
+        self._balance(self._source)
+        for (i, j), values in self._along.own.items():
+            found[:, i::2, j::2] = values
+        self._along = along
         return found
+
+
+def _product(first: Parts, second: Parts) -> Array:
+    """Return inner products of values of the cells that are solved for, shape (n,)."""
+    return np.asarray(sum(np.einsum("nxy,nxy->n", first[one], second[one]) for one in _SOLVED))
