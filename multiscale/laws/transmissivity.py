@@ -144,10 +144,9 @@ def sample_transmissivity(
     rows = _solved(samples, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
-        error = np.minimum(error_of_grid(known, *coarser), known)
-        allowed = np.maximum(_OFF * known, _OF_GRID * error)
-        off = _missed(separation, known, allowed)
-        closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
+        error = error_of_grid(known, *coarser)
+        off = _missed(separation, known, np.maximum(_OFF * known, _OF_GRID * error))
+        closes = ((known[:-1] > error[:-1]) & (known[1:] == 0.0)).any(axis=1)
         wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
         wide &= known[:-1].any(axis=1)
         if not wide.any():
