@@ -48,21 +48,28 @@ _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
 _MOST_TOGETHER = 192**2
 """Cells up to which directions are solved together. More than that of one fill a core's cache."""
-_TOLERANCE, _MOST_ITERATIONS = 1e-7, 100
-"""Iterations end when the last quarter of them, two at least, changed the flow by this part of it.
-That left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 % in contact,
-and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and 3 · 10⁻⁵ on
-a map that took 51 iterations. Beside conductivities so unlike that the flow is 10⁻⁸ of that through
-the widest cell, rounding leaves 10⁻⁶ to 3 · 10⁻⁵ of it, and 10⁻⁴ beside 10⁻¹⁰."""
-_IMBALANCE = 0.1
-"""What enters and leaves cells may differ by this part of the flow then, summed over all of them.
-The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
-square as a rule. By changes alone, iterations that stood still ended at 10⁹ times the flow: all 7
-such maps of 150, whose gaps differ by up to 10⁷, had an imbalance of 1000 and more, others 14."""
+_MOST_ITERATIONS = 100
+"""Iterations end when the last quarter of them, two at least, changed the flow by the tolerance of
+it. With 10⁻⁷ that left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 %
+in contact, and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and
+3 · 10⁻⁵ on a map that took 51 iterations. With 10⁻⁴ it left 10⁻⁸ of 375 flows in the median and
+6 · 10⁻⁷ in 95 %, 5 · 10⁻⁵ at most of ridges and of cells of unlike gaps. Beside conductivities so
+unlike that the flow is 10⁻⁸ of that through the widest cell, rounding leaves 10⁻⁶ to 3 · 10⁻⁵ of
+it, and 10⁻⁴ beside 10⁻¹⁰."""
+_IMBALANCE, _MOST_IMBALANCE = 300.0, 1.0
+"""What enters and leaves cells may differ by so many times the root of the tolerance, times the
+flow, then, and by so much at most, summed over all of them. The flow errs by as much at most, as
+potentials lie between those of the terminals, and by about its square as a rule. By changes alone,
+iterations that stood still ended at up to 10⁹ times the flow, all with an imbalance above 1."""
 
 
 def cell_flows(
-    gap: Array, lengths: tuple[float, float], axes: Sequence[int], *, periodic: bool
+    gap: Array,
+    lengths: tuple[float, float],
+    axes: Sequence[int],
+    *,
+    periodic: bool,
+    tolerance: float = 1e-7,
 ) -> list[tuple[Array, float]] | None:
     """Return fluid pressures of cells and flows along axes between pressures of 1 and 0.
 
@@ -71,6 +78,7 @@ def cell_flows(
         lengths: Sides of the map [mm].
         axes: 0 for a flow along x, 1 along y.
         periodic: Whether the map continues over the sides along the flow.
+        tolerance: See `potentials`.
 
     Returns:
         For each axis pressures, shape (nx, ny), NaN where no path from a side leads, and the flow
@@ -89,11 +97,10 @@ def cell_flows(
         flowing.append(np.isin(joined, through[through > 0])[pools])
     flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
     for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
-        maps = []
-        for k in some:
-            part = gap / size * flowing[k]
-            maps.append(_links(part * part * part, lengths, axes[k], periodic))
-        solved = potentials(*map(np.array, zip(*maps, strict=True)))
+        maps = [_links(gap / size * flowing[k], lengths, axes[k], periodic) for k in some]
+        links = [np.array(one) for one in zip(*maps, strict=True)]
+        maps.clear()
+        solved = potentials(links, tolerance)
         if solved is None:
             return None
         flows[some] = solved[1] * size**3
@@ -119,14 +126,14 @@ def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.int
 
 
 def _links(
-    conductivity: Array, lengths: tuple[float, float], axis: int, periodic: bool
+    gap: Array, lengths: tuple[float, float], axis: int, periodic: bool
 ) -> list[Array]:
     """Return links along x and y, to the source and to the sink, as `potentials` takes them."""
-    shape = conductivity.shape
+    shape = gap.shape
     wide = lengths[1] / shape[1] / (lengths[0] / shape[0])
     widths = wide, 1.0 / wide
     with np.errstate(divide="ignore"):
-        half = 0.5 / conductivity  # of the way between centres lies in each of two cells
+        half = 0.5 / (gap * gap * gap)  # of the way between centres lies in each of two cells
     found = []
     for along in (0, 1):
         links = widths[along] / (half + np.roll(half, -1, along))
@@ -140,48 +147,38 @@ def _links(
     return found
 
 
-def potentials(
-    along_x: Array, along_y: Array, source: Array, sink: Array
-) -> tuple[Array, Array] | None:
+def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | None:
     """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
 
     The flow is the power that the potentials dissipate, whose error is of second order in theirs.
 
     Args:
-        along_x: Links of each cell to the next one along x, from the last to the first, for n
-            directions of flow, shape (n, nx, ny). 1 is about the largest.
-        along_y: The same along y.
-        source: Links to the terminal of potential 1.
-        sink: Links to that of potential 0.
+        given: Links of each cell to the next one along x, from the last to the first, the same
+            along y, links to the terminal of potential 1 and to that of 0; for n directions of flow
+            shape (n, nx, ny) each. 1 is about the largest. Emptied, which frees them.
+        tolerance: Error of the flows that does no harm, relative to them.
 
     Returns:
         Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
-    (along_x, along_y, source, sink), kept = _even([along_x, along_y, source, sink])
+    (along_x, along_y, source, sink), kept = _even(given)
+    given.clear()
     links = {(1, 0): along_x, (0, 1): along_y}
     diagonal = sum(link + _at(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
     cycle = _Cycle(links, diagonal)
+    del along_x, along_y, links, diagonal  # which the cycle has as it needs them
     iteration = _Iteration(cycle, source)
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
+    most = min(_IMBALANCE * np.sqrt(tolerance), _MOST_IMBALANCE)
     for count in range(_MOST_ITERATIONS):
         changes = iteration.step()
-        if not count or (changes > _TOLERANCE * np.maximum(iteration.flow, least)).any():
-            continue
-        left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
-        if (left <= np.maximum(iteration.flow, least)).all():
-            found = iteration.potential()
-            flow = _power(source, 1.0 - found) + _power(sink, found)
-            for offset, link in links.items():
-                flow += _power(link, found - _at(found, offset))
+        left = np.maximum(changes / tolerance, iteration.imbalance / most)
+        if count and (left <= np.maximum(iteration.flow, least)).all():
+            found, flow = iteration.found(sink)
             if (left <= flow).all():
                 return found[:, kept[0]][:, :, kept[1]], flow
     return None
-
-
-def _power(link: Array, drop: Array) -> Array:
-    """Return the power that drops of potential dissipate in links, shape (n,)."""
-    return np.asarray(np.einsum("nxy,nxy,nxy->n", link, drop, drop))
 
 
 def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
@@ -371,6 +368,13 @@ class _Grid:
                 found[key] += np.multiply(weight, row, out=row)
         return found, -found.pop((0, 0))
 
+    def relaxes_alone(self, entirely: bool) -> None:
+        """Free what only coarser grids are made from, and iterations on the finest one need."""
+        self.weights.clear()
+        if entirely:
+            for values in (self.links, self.diagonal, self.inverse):
+                values.clear()
+
     def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
         """Return what flows into cells of a parity from others, themselves at 0."""
         total, beside = None, self.found.beside[parity]
@@ -434,7 +438,7 @@ class _Cycle:
         self.grids = [_Grid(links, diagonal)]
         while max(self.grids[-1].shape[1:]) > _COARSEST:
             coarser = self.grids[-1].coarser()
-            self.grids[-1].weights.clear()  # in double precision
+            self.grids[-1].relaxes_alone(len(self.grids) > 1)
             self.grids.append(_Grid(*coarser))
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
@@ -493,6 +497,7 @@ class _Iteration:
     def __init__(self, cycle: _Cycle, source: Array) -> None:
         self._cycle, self._grid = cycle, cycle.grids[0]
         shape = self._grid.shape
+        self._all_of_source = source
         self._source = {(i, j): source[:, i::2, j::2] for i, j in _PARITIES}
         self._along, self._work = _Cells(shape, float), np.empty(shape)
         self.flow = source.sum(axis=(1, 2))
@@ -555,19 +560,31 @@ class _Iteration:
         """Sum of the absolute differences of what enters and leaves all cells, shape (n,)."""
         return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in self._residual.values()))
 
-    def potential(self) -> Array:
-        """Return the potential of all cells, shape (n, nx, ny)."""
-        count, nx, ny = self._grid.shape
-        found, along = np.empty((count, 2 * nx, 2 * ny)), self._along
-        self._along = _Cells(self._grid.shape, float)
+    def found(self, sink: Array) -> tuple[Array, Array]:
+        """Return the potential of all cells, shape (n, nx, ny), and the power it dissipates, (n,).
+
+        Args:
+            sink: See `potentials`.
+        """
+        grid, along = self._grid, self._along
+        self._along = _Cells(grid.shape, float)
         for one, values in self._potential.items():
             self._along.own[one][:] = values
             self._along.wrap(one)
         self._balance(self._source)
+        found = np.empty((grid.shape[0], 2 * grid.shape[1], 2 * grid.shape[2]))
         for (i, j), values in self._along.own.items():
             found[:, i::2, j::2] = values
+        source = self._all_of_source
+        flow = np.einsum("nxy,nxy->n", source, (1.0 - found) ** 2)
+        flow += np.einsum("nxy,nxy,nxy->n", sink, found, found)
+        for one in _BETWEEN:  # which all links lead from
+            own = self._along.own[one]
+            for key, link in grid.links[one].items():
+                drop = np.subtract(own, self._along.beside[one][key], out=self._work)
+                flow += np.einsum("nxy,nxy,nxy->n", link, drop, drop)
         self._along = along
-        return found
+        return found, flow
 
 
 def _product(first: Parts, second: Parts) -> Array:

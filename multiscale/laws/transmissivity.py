@@ -39,6 +39,9 @@ def flow_memory(cells: int) -> float:
     return cells * _CELL
 
 
+ROUGH = 1e-4
+"""Error of flows that does no harm where they tell an error, or lie in a table whose rows tell them
+to some 10⁻³."""
 _QUARTER, _LEAST, _ENDS, _APART = 0.75, 0.02, 2.0, 3.0
 """Parts that the error of a flow is at least: of the power by which it changes from a quarter to
 half as many cells a side, as either change may vanish by chance; of the flow; and of the flow next
@@ -298,7 +301,8 @@ class _Sample:
                 break
             gap, found[row, 2] = self._pressed(separation)
             gap = widened_gap(gap, periodic=True) if widened else gap
-            found[row, :2] = [one.transmissivity for one in gap_flows(gap, lengths, periodic=True)]
+            flows = gap_flows(gap, lengths, periodic=True, tolerance=ROUGH)
+            found[row, :2] = [one.transmissivity for one in flows]
             if not found[row, :2].any():
                 break
         return found
@@ -387,7 +391,7 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> list[float]:
         parts.append(slice(place * cells // count, -(-(place + 1) * cells // count)))
         sides.append(length * (parts[-1].stop - parts[-1].start) / cells)
     own, lengths = gap[parts[0], parts[1]], (sides[0], sides[1])
-    return [flow.transmissivity for flow in gap_flows(own, lengths)]
+    return [flow.transmissivity for flow in gap_flows(own, lengths, tolerance=ROUGH)]
 
 
 def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:
