@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 16.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,19 +25,21 @@ from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support import Array, Flags, shared
 
-_CELL = 1000.0
+_CELL, _TABLED = 1000.0, 250.0
 """Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
-not converge. That took 520 on up to 192² cells and 290 on more, 800 and 430 on 130² and 513², which
-are filled up to 160² and 640²; maps of up to 72² cells, with factors of bands, 6 MB at most."""
+not converge. That took 400 on up to 192² cells and 220 on more; maps of up to 72² cells, with
+factors of bands, 6 MB at most. And what a table of leaks keeps for every cell of its samples [B]:
+pressures that further rows start from, of 13 to 20 rows on all grids."""
 
 
-def flow_memory(cells: int) -> float:
+def flow_memory(cells: int, tabled: int = 0) -> float:
     """Return the memory that flows through a map of gaps take [B].
 
     Args:
         cells: Number of cells.
+        tabled: Number of cells of samples whose leaks a process tabulates.
     """
-    return cells * _CELL
+    return cells * _CELL + tabled * _TABLED
 
 
 ROUGH = 1e-4
@@ -110,6 +113,8 @@ _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
 """Approaches of a whole surface, from first touch to the largest load."""
+_TOLERANCE = 1e-5
+"""Tolerance of contacts in tables: T differs by 10⁻⁶ of itself, and by 10⁻⁴ next to closing."""
 _FEWEST_CELLS = 16
 """Cells along a side below which half of them are not tried."""
 
@@ -289,8 +294,8 @@ class _Sample:
         nx, ny = model.surface.grid
         if coarser > 1 and min(nx, ny) >= _FEWEST_CELLS:
             model = model.resampled((nx // coarser, ny // coarser))
-        self._model, self._starts = model, dict[float, Start]()
-        self._known: dict[float, tuple[Array, float]] = {}
+        self._model = replace(model, tolerance=max(model.tolerance, _TOLERANCE))
+        self._starts: dict[float, Start] = {}
 
     def rows(self, separations: Array, *, widened: bool = False) -> Array:
         """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3)."""
@@ -310,20 +315,15 @@ class _Sample:
     def _pressed(self, separation: float) -> tuple[Array, float]:
         """Return gaps at a separation, shape (nx, ny) [mm], and the mean pressure [MPa].
 
-        Contacts start from those next to them.
+        Contacts start from those next to them, or where they are known already.
         """
         model, surface = self._model, self._model.surface
-        if separation not in self._known:
-            approach = _separation(model, 0.0) - separation
-            if approach <= model.first_touch:
-                gap, pressure = separation + surface.mean_height - surface.heights, 0.0
-                gap = np.maximum(gap, 0.0)
-            else:
-                (state,) = press_along(model, approach, known=self._starts)
-                self._starts[approach] = state.guess
-                gap, pressure = state.open_gap, state.mean_pressure
-            self._known[separation] = gap, pressure
-        return self._known[separation]
+        approach = _separation(model, 0.0) - separation
+        if approach <= model.first_touch:
+            return np.maximum(separation + surface.mean_height - surface.heights, 0.0), 0.0
+        (state,) = press_along(model, approach, known=self._starts)
+        self._starts[approach] = state.guess
+        return state.open_gap, state.mean_pressure
 
 
 def patch_transmissivities(
