@@ -258,7 +258,7 @@ def gap_flows(
     found = None
     shorter, longer = sorted(gap.shape)
     if shorter**2 > _MOST_FACTORISED and longer <= _THIN * shorter:
-        from patchlaw.micro.gap_multigrid import cell_flows  # small maps do without
+        from patchlaw.micro.gap_iteration import cell_flows  # small maps do without
 
         found = cell_flows(open_gap, lengths, axes, periodic=periodic, tolerance=tolerance)
     if found is None:

@@ -199,7 +199,9 @@ class GapLeakObserver(LeakObserver):
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
         def rates(gap: Array | None) -> Array:
             comm = self._coupling.comm
-            return np.array(on_root_alone(comm, lambda: list(map(self._rate, self._through(gap, ROUGH)))))
+            return np.array(
+                on_root_alone(comm, lambda: list(map(self._rate, self._through(gap, ROUGH))))
+            )
 
         if cause == _WEAR:
             return list(rates(self._coupling.other_gap(step, worn=True)))

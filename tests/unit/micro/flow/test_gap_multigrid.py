@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro import gap_multigrid, transport
+from patchlaw.micro import gap_iteration, transport
 from patchlaw.micro.transport import gap_flows
 
 
@@ -60,7 +60,7 @@ def test_parallel_plates_let_the_cube_of_their_gap_through(monkeypatch):
 
 
 def test_what_does_not_converge_is_factorised(monkeypatch):
-    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 3)
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 3)
     for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
         assert one.transmissivity == other.transmissivity
 
@@ -81,13 +81,13 @@ def test_slow_maps_end_no_earlier(monkeypatch):
 
 def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
     """What was added to 97 cells took more than twice as many as chains of 15 cells."""
-    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 16)
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 16)
     for count in (96, 97, 111):
         gap = channels((count, count), 1, 0.1)
-        assert gap_multigrid.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
+        assert gap_iteration.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
 
 
 def test_thin_maps_are_factorised(monkeypatch):
-    monkeypatch.delattr(gap_multigrid, "cell_flows")
+    monkeypatch.delattr(gap_iteration, "cell_flows")
     for flow in gap_flows(np.full((3, 4000), 1e-3), (0.003, 4.0), periodic=True):
         assert flow.flow_factor == pytest.approx(1.0, rel=1e-7)
