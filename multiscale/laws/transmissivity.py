@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import Start
@@ -25,11 +25,11 @@ from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support import Array, Flags, shared
 
-_CELL, _TABLED = 1000.0, 250.0
+_CELL, _TABLED = 1000.0, 320.0
 """Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
 not converge. That took 400 on up to 192² cells and 220 on more; maps of up to 72² cells, with
 factors of bands, 6 MB at most. And what a table of leaks keeps for every cell of its samples [B]:
-pressures that further rows start from, of 13 to 20 rows on all grids."""
+pressures that further rows start from on all grids, and gaps on the finest, of 20 to 27 rows."""
 
 
 def flow_memory(cells: int, tabled: int = 0) -> float:
@@ -296,6 +296,8 @@ class _Sample:
             model = model.resampled((nx // coarser, ny // coarser))
         self._model = replace(model, tolerance=max(model.tolerance, _TOLERANCE))
         self._starts: dict[float, Start] = {}
+        self._known: dict[float, tuple[NDArray[np.float32], float]] = {}
+        self._widens = coarser == 1
 
     def rows(self, separations: Array, *, widened: bool = False) -> Array:
         """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3)."""
@@ -315,15 +317,21 @@ class _Sample:
     def _pressed(self, separation: float) -> tuple[Array, float]:
         """Return gaps at a separation, shape (nx, ny) [mm], and the mean pressure [MPa].
 
-        Contacts start from those next to them, or where they are known already.
+        Contacts start from those next to them.
         """
         model, surface = self._model, self._model.surface
-        approach = _separation(model, 0.0) - separation
-        if approach <= model.first_touch:
-            return np.maximum(separation + surface.mean_height - surface.heights, 0.0), 0.0
-        (state,) = press_along(model, approach, known=self._starts)
-        self._starts[approach] = state.guess
-        return state.open_gap, state.mean_pressure
+        if separation not in self._known:
+            approach = _separation(model, 0.0) - separation
+            if approach <= model.first_touch:
+                gap, pressure = separation + surface.mean_height - surface.heights, 0.0
+                return np.maximum(gap, 0.0), pressure
+            (state,) = press_along(model, approach, known=self._starts)
+            self._starts[approach] = state.guess
+            if not self._widens:
+                return state.open_gap, state.mean_pressure
+            self._known[separation] = state.open_gap.astype(np.float32), state.mean_pressure
+        gap, pressure = self._known[separation]
+        return gap.astype(float), pressure
 
 
 def patch_transmissivities(
