@@ -79,6 +79,19 @@ def test_slow_maps_end_no_earlier(monkeypatch):
     assert along_x[0].transmissivity == pytest.approx(along_x[1].transmissivity, rel=1e-8, abs=0)
 
 
+def test_flows_stay_within_a_looser_tolerance(monkeypatch):
+    """Their iterations end earlier then."""
+    found = {}
+    for allowed in (1e-4, 1e-7):
+        found[allowed], exact = zip(
+            *both(channels((50, 50), 36, 0.34), monkeypatch, periodic=True, tolerance=allowed),
+            strict=True,
+        )
+        for one, other in zip(found[allowed], exact, strict=True):
+            assert one.transmissivity == pytest.approx(other.transmissivity, rel=allowed, abs=0)
+    assert found[1e-4][0].transmissivity != found[1e-7][0].transmissivity
+
+
 def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
     """What was added to 97 cells took more than twice as many as chains of 15 cells."""
     monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 16)
