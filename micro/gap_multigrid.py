@@ -7,8 +7,8 @@ grids have the operator that follows. Pools of fluid between contact that no coa
 or that are linked to one by a narrow link alone, would be lost so: cells have a small link to both
 sides besides (`_SHARE`), by which a coarse cell in contact can stand for the pool beside it.
 
-One cycle, in single precision, preconditions conjugate gradients in double precision. Flows in
-several directions are solved together, as arrays whose first axis is the direction.
+One cycle, in single precision, preconditions `gap_iteration`. Flows in several directions are
+solved together, as arrays whose first axis is the direction.
 
 Cells are stored by the parity (even or odd) of their two indices, as arrays without strides. All
 maps continue over their sides; walls are links of 0.
@@ -24,15 +24,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
-from scipy.sparse import csgraph
 
 from patchlaw.support import Array
 
 Offset = tuple[int, int]
 Parts = dict[Offset, NDArray[np.floating]]
 
-_PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
+PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
 """Order in which cells are relaxed: those of the first two and of the last two, on the finest grid,
 have no links among themselves."""
 _HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
@@ -41,174 +39,13 @@ _SHARE = 1e-5
 """Links to both sides besides, over the sum of all links of a cell. Eight flows through maps of
 256² and 512² cells, 2 and 20 % in contact, took 7 to 12 iterations with 10⁻⁵, 7 to 18 with 10⁻⁴ and
 7 to 21 with 10⁻³; some took more than 40 without."""
-_COARSEST = 8
+COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
 _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
-_MOST_TOGETHER = 192**2
-"""Cells up to which directions are solved together. More than that of one fill a core's cache."""
-_TOLERANCE, _MOST_ITERATIONS = 1e-7, 100
-"""Iterations end when the last quarter of them, two at least, changed the flow by this part of it.
-That left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 % in contact,
-and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and 3 · 10⁻⁵ on
-a map that took 51 iterations. Beside conductivities so unlike that the flow is 10⁻⁸ of that through
-the widest cell, rounding leaves 10⁻⁶ to 3 · 10⁻⁵ of it, and 10⁻⁴ beside 10⁻¹⁰."""
-_IMBALANCE = 0.1
-"""What enters and leaves cells may differ by this part of the flow then, summed over all of them.
-The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
-square as a rule. By changes alone, iterations that stood still ended at 10⁹ times the flow: all 7
-such maps of 150, whose gaps differ by up to 10⁷, had an imbalance of 1000 and more, others 14."""
 
 
-def cell_flows(
-    gap: Array, lengths: tuple[float, float], axes: Sequence[int], *, periodic: bool
-) -> list[tuple[Array, float]] | None:
-    """Return fluid pressures of cells and flows along axes between pressures of 1 and 0.
-
-    Args:
-        gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
-        lengths: Sides of the map [mm].
-        axes: 0 for a flow along x, 1 along y.
-        periodic: Whether the map continues over the sides along the flow.
-
-    Returns:
-        For each axis pressures, shape (nx, ny), NaN where no path from a side leads, and the flow
-        [mm³]; None where iterations do not converge.
-    """
-    size, pressures, flowing = float(gap.max(initial=0.0)), [], []
-    pools, count = ndimage.label(gap > 0.0)
-    for axis in axes:
-        joined = _joined(pools, count, 1 - axis) if periodic else np.arange(count + 1)
-        ends = [joined[np.unique(pools.take(side, axis))] for side in (0, -1)]
-        by_pool, through = np.full(count + 1, np.nan), np.intersect1d(*ends)
-        for one, value in zip(ends, (1.0, 0.0), strict=True):
-            by_pool[np.isin(joined, one)] = value
-        by_pool[0] = np.nan
-        pressures.append(by_pool[pools])
-        flowing.append(np.isin(joined, through[through > 0])[pools])
-    flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
-    for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
-        maps = []
-        for k in some:
-            part = gap / size * flowing[k]
-            maps.append(_links(part * part * part, lengths, axes[k], periodic))
-        solved = potentials(*map(np.array, zip(*maps, strict=True)))
-        if solved is None:
-            return None
-        flows[some] = solved[1] * size**3
-        for k, potential in zip(some, solved[0], strict=True):
-            pressures[k][flowing[k]] = np.clip(potential[flowing[k]], 0.0, 1.0)
-    return list(zip(pressures, flows.tolist(), strict=True))
-
-
-def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
-    """Return a number for each pool that those share which paths over sides join, 0 for contact.
-
-    Args:
-        pools: Number of the pool that a cell belongs to, 0 for contact, shape (nx, ny).
-        count: How many there are.
-        axis: Axis along which the map continues over its sides.
-    """
-    pairs = np.stack([pools.take(0, axis), pools.take(-1, axis)])
-    pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
-    graph = sparse.coo_matrix((np.ones(pairs.shape[1]), pairs), (count + 1, count + 1))
-    joined = 1 + csgraph.connected_components(graph, False)[1]
-    joined[0] = 0
-    return np.asarray(joined)
-
-
-def _links(
-    conductivity: Array, lengths: tuple[float, float], axis: int, periodic: bool
-) -> list[Array]:
-    """Return links along x and y, to the source and to the sink, as `potentials` takes them."""
-    shape = conductivity.shape
-    wide = lengths[1] / shape[1] / (lengths[0] / shape[0])
-    widths = wide, 1.0 / wide
-    with np.errstate(divide="ignore"):
-        half = 0.5 / conductivity  # of the way between centres lies in each of two cells
-    found = []
-    for along in (0, 1):
-        links = widths[along] / (half + np.roll(half, -1, along))
-        if along == axis or not periodic:
-            np.moveaxis(links, along, 0)[-1] = 0.0
-        found.append(links)
-    for side in (0, -1):
-        links = np.zeros(shape)
-        np.moveaxis(links, axis, 0)[side] = widths[axis] / half.take(side, axis)
-        found.append(links)
-    return found
-
-
-def potentials(
-    along_x: Array, along_y: Array, source: Array, sink: Array
-) -> tuple[Array, Array] | None:
-    """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
-
-    The flow is the power that the potentials dissipate, whose error is of second order in theirs.
-
-    Args:
-        along_x: Links of each cell to the next one along x, from the last to the first, for n
-            directions of flow, shape (n, nx, ny). 1 is about the largest.
-        along_y: The same along y.
-        source: Links to the terminal of potential 1.
-        sink: Links to that of potential 0.
-
-    Returns:
-        Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
-        iterations do not converge.
-    """
-    (along_x, along_y, source, sink), kept = _even([along_x, along_y, source, sink])
-    links = {(1, 0): along_x, (0, 1): along_y}
-    diagonal = sum(link + _at(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
-    cycle = _Cycle(links, diagonal)
-    iteration = _Iteration(cycle, source)
-    least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
-    for count in range(_MOST_ITERATIONS):
-        changes = iteration.step()
-        if count and (changes <= _TOLERANCE * np.maximum(iteration.flow, least)).all():
-            found = iteration.potential
-            flow = _power(source, 1.0 - found) + _power(sink, found)
-            for offset, link in links.items():
-                flow += _power(link, found - _at(found, offset))
-            left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
-            if (left <= flow).all():
-                return found[:, kept[0]][:, :, kept[1]], flow
-    return None
-
-
-def _power(link: Array, drop: Array) -> Array:
-    """Return the power that drops of potential dissipate in links, shape (n,)."""
-    return np.asarray(np.einsum("nxy,nxy,nxy->n", link, drop, drop))
-
-
-def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
-    """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
-
-    Rows that are added lie, evenly spread, in the links from some to the next, which they divide.
-    Many between two others would be chains side by side without links, of which coarser grids lose
-    every second one.
-
-    Args:
-        links: Those along x and y, to the source and to the sink, as `potentials` takes them.
-    """
-    halvings = int(np.ceil(np.log2(max(*links[0].shape[1:], _COARSEST) / _COARSEST)))
-    kept: list[Any] = []
-    for axis, count in enumerate(links[0].shape[1:], start=1):
-        most = count + -count % 2 ** max(halvings, 1)
-        if most == count:
-            kept.append(slice(None))
-            continue
-        order = np.arange(most) * count // most
-        kept.append(np.diff(order, prepend=-1) > 0)
-        times = np.bincount(order)[order]  # links in series in place of one
-        for k, values in enumerate(links):
-            factor = times if k + 1 == axis else kept[-1]
-            wide = values.take(order, axis)
-            links[k] = wide * (factor[:, None] if axis == 1 else factor)
-    return links, kept
-
-
-def _at(values: NDArray[Any], offset: Offset) -> NDArray[Any]:
+def shifted(values: NDArray[Any], offset: Offset) -> NDArray[Any]:
     """Return what lies at an offset from each cell."""
     i, j = offset
     if i:
@@ -229,7 +66,7 @@ def _halves(x: int, y: int) -> tuple[Offset, Offset]:
     return (x % 2, y % 2), (x // 2, y // 2)
 
 
-class _Cells:
+class Cells:
     """Values of cells by parity, with a line of those beyond the side that others look at.
 
     Args:
@@ -239,19 +76,19 @@ class _Cells:
 
     def __init__(self, shape: tuple[int, ...], dtype: type) -> None:
         count, nx, ny = shape
-        self._all: Parts = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in _PARITIES}
+        self._all: Parts = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in PARITIES}
 
         def seen(parity: int, offset: int, cells: int) -> slice:
             first = parity if offset == 0 else (offset + 1) // 2
             return slice(first, first + cells)
 
-        self.beside: dict[Offset, Parts] = {one: {} for one in _PARITIES}
-        for one, i, j in product(_PARITIES, (-1, 0, 1), (-1, 0, 1)):
+        self.beside: dict[Offset, Parts] = {one: {} for one in PARITIES}
+        for one, i, j in product(PARITIES, (-1, 0, 1), (-1, 0, 1)):
             offset = i, j
             other = _halves(one[0] + i, one[1] + j)[0]
             cut = (seen(*each) for each in zip(one, offset, (nx, ny), strict=True))
             self.beside[one][offset] = self._all[other][:, *cut]
-        self.own = {one: self.beside[one][0, 0] for one in _PARITIES}
+        self.own = {one: self.beside[one][0, 0] for one in PARITIES}
 
     def wrap(self, parity: Offset) -> None:
         """Renew the line beyond the side."""
@@ -264,10 +101,10 @@ class _Cells:
 
 def _both_ways(half: dict[Offset, Parts]) -> dict[Offset, Parts]:
     """Return all links of cells of each parity, from half of them by offset and parity."""
-    found: dict[Offset, Parts] = {one: {} for one in _PARITIES}
-    for one, ((i, j), parts) in product(_PARITIES, half.items()):
+    found: dict[Offset, Parts] = {one: {} for one in PARITIES}
+    for one, ((i, j), parts) in product(PARITIES, half.items()):
         other, base = _halves(one[0] - i, one[1] - j)
-        found[one] |= {(i, j): parts[one], (-i, -j): _at(parts[other], base)}
+        found[one] |= {(i, j): parts[one], (-i, -j): shifted(parts[other], base)}
     return found
 
 
@@ -281,32 +118,28 @@ class _Grid:
 
     def __init__(self, links: Parts, diagonal: Array) -> None:
         def split(values: Array) -> Parts:
-            return {(i, j): np.ascontiguousarray(values[:, i::2, j::2]) for i, j in _PARITIES}
+            return {(i, j): np.ascontiguousarray(values[:, i::2, j::2]) for i, j in PARITIES}
 
         self.diagonal, half = split(diagonal), {key: split(one) for key, one in links.items()}
         self.links = _both_ways(half)
         self.shape = self.diagonal[0, 0].shape
-        inverse = {one: self._over(1.0, self.diagonal[one], one) for one in _PARITIES}
-        self.weights = self._weights(inverse)
-        self.found, self._work = _Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
-        self._inverse = {one: values.astype(np.float32) for one, values in inverse.items()}
-        low = {
-            key: {one: link.astype(np.float32) for one, link in parts.items()}
-            for key, parts in half.items()
-        }
+        self.inverse = {one: self._over(1.0, self.diagonal[one], one) for one in PARITIES}
+        self.weights = self._weights(self.inverse)
+        self.found, self._work = Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
+        self._inverse = {one: values.astype(np.float32) for one, values in self.inverse.items()}
         self._low = {
             one: [
-                (_halves(one[0] + key[0], one[1] + key[1])[0], link, key)
+                (_halves(one[0] + key[0], one[1] + key[1])[0], link.astype(np.float32), key)
                 for key, link in seen.items()
             ]
-            for one, seen in _both_ways(low).items()
+            for one, seen in self.links.items()
         }
         self._low_weights = {
             one: [(key, weight.astype(np.float32)) for key, weight in self.weights[one].items()]
-            for one in _PARITIES
+            for one in PARITIES
         }
         among = 2 if len(links) == 2 else 1
-        self._first, self._last = _PARITIES[:among], _PARITIES[-among:]
+        self._first, self._last = PARITIES[:among], PARITIES[-among:]
 
     def _over(self, values: Array | float, by: Array, parity: Offset) -> Array:
         """Return values over others in open cells of a parity, 0 in closed ones."""
@@ -331,7 +164,7 @@ class _Grid:
             other, base = _halves(1 + key[0], 1 + key[1])
             for coarse, weight in found[other].items():
                 to = base[0] + coarse[0], base[1] + coarse[1]
-                middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * _at(weight, base)
+                middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * shifted(weight, base)
         found[1, 1] = middle
         return found
 
@@ -341,8 +174,8 @@ class _Grid:
         Nothing flows out of cells of parity (1, 1), whose weights are what balances them.
         """
         weights = {
-            (one[0] - 2 * key[0], one[1] - 2 * key[1]): _at(weight, (-key[0], -key[1]))
-            for one in _PARITIES
+            (one[0] - 2 * key[0], one[1] - 2 * key[1]): shifted(weight, (-key[0], -key[1]))
+            for one in PARITIES
             for key, weight in self.weights[one].items()
         }  # of each cell of the coarser grid in the cells around it
         wide = {key: _wide(one) for key, one in weights.items()}
@@ -355,7 +188,7 @@ class _Grid:
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
             entries = {(0, 0): -self.diagonal[one], **self.links[one]}
             for key, entry in entries.items():
-                value, to = _at(entry, base), (place[0] + key[0], place[1] + key[1])
+                value, to = shifted(entry, base), (place[0] + key[0], place[1] + key[1])
                 for x, y in product(*((0,) if k % 2 == 0 else (-1, 1) for k in to)):
                     i, j = (to[0] - x) // 2, (to[1] - y) // 2
                     if (i, j) in found:
@@ -367,6 +200,13 @@ class _Grid:
             for key, row in rows.items():
                 found[key] += np.multiply(weight, row, out=row)
         return found, -found.pop((0, 0))
+
+    def relaxes_alone(self, entirely: bool) -> None:
+        """Free what only coarser grids are made from, and iterations on the finest one need."""
+        self.weights.clear()
+        if entirely:
+            for values in (self.links, self.diagonal, self.inverse):
+                values.clear()
 
     def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
         """Return what flows into cells of a parity from others, themselves at 0."""
@@ -388,33 +228,38 @@ class _Grid:
 
     def before(self, right: Parts) -> NDArray[np.floating]:
         """Relax all cells once, from zero, and return the residual of the next coarser grid."""
-        for count, parity in enumerate(_PARITIES):
-            self._relax(right, parity, () if parity in self._first else _PARITIES[:count])
+        done: list[Offset] = []
+        for parity in right:
+            self._relax(right, parity, () if parity in self._first else done)
+            done.append(parity)
         coarse = None
-        for count, parity in enumerate(_PARITIES[: -len(self._last)]):
-            residual = self._from(parity, _PARITIES[count + 1 :])  # as later ones came after it
+        for count, parity in enumerate(PARITIES[: -len(self._last)]):
+            residual = self._from(parity, PARITIES[count + 1 :])  # as later ones came after it
             assert residual is not None
             if coarse is None:
                 coarse = residual
                 continue
             for (i, j), weight in self._low_weights[parity]:
-                coarse += _at(np.multiply(weight, residual, out=self._work), (-i, -j))
+                coarse += shifted(np.multiply(weight, residual, out=self._work), (-i, -j))
         assert coarse is not None
         return coarse
 
     def after(self, right: Parts, change: NDArray[np.floating]) -> None:
         """Add the change that a coarser grid found, and relax all cells once in reverse order."""
         wide, (_, nx, ny) = _wide(change), self.shape
-        for parity in _PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
+        for parity in PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
+            own = self.found.own[parity]
+            if parity not in right:
+                own[:] = 0.0
             for (i, j), weight in self._low_weights[parity]:
                 beside = wide[:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
-                self.found.own[parity] += np.multiply(weight, beside, out=self._work)
+                own += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
-        for parity in _PARITIES[::-1]:
-            self._relax(right, parity, _PARITIES)
+        for parity in reversed(right):
+            self._relax(right, parity, PARITIES)
 
 
-class _Cycle:
+class Cycle:
     """A V-cycle of all grids, symmetric.
 
     Args:
@@ -424,9 +269,9 @@ class _Cycle:
 
     def __init__(self, links: Parts, diagonal: Array) -> None:
         self.grids = [_Grid(links, diagonal)]
-        while max(self.grids[-1].shape[1:]) > _COARSEST:
+        while max(self.grids[-1].shape[1:]) > COARSEST:
             coarser = self.grids[-1].coarser()
-            self.grids[-1].weights.clear()  # in double precision
+            self.grids[-1].relaxes_alone(len(self.grids) > 1)
             self.grids.append(_Grid(*coarser))
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
@@ -441,7 +286,7 @@ class _Cycle:
         coarse = grid.before(right)
         change = np.empty_like(coarse)
         if depth + 1 < len(self.grids):
-            parts = {(i, j): np.ascontiguousarray(coarse[:, i::2, j::2]) for i, j in _PARITIES}
+            parts = {(i, j): np.ascontiguousarray(coarse[:, i::2, j::2]) for i, j in PARITIES}
             for (i, j), part in self(parts, depth + 1).items():
                 change[:, i::2, j::2] = part
         else:
@@ -458,7 +303,7 @@ def _inverse(links: Parts, diagonal: Array) -> Array:
     is_open, matrix = flat > _LEAST, np.zeros((count, size, size))
     scale = 1.0 / np.sqrt(np.where(is_open, flat, 1.0))
     for key, link in links.items():
-        ends = index.ravel(), _at(index, key).ravel()
+        ends = index.ravel(), shifted(index, key).ravel()
         for places in (ends, ends[::-1]):
             np.subtract.at(matrix, (slice(None), *places), link.reshape(count, -1))
     matrix *= scale[:, :, None] * scale[:, None, :]
@@ -466,75 +311,3 @@ def _inverse(links: Parts, diagonal: Array) -> Array:
     scale = np.where(is_open, scale, 0.0)
     inverse = np.linalg.inv(matrix) * scale[:, :, None] * scale[:, None, :]
     return 0.5 * (inverse + inverse.swapaxes(1, 2))
-
-
-class _Iteration:
-    """Conjugate gradients from the potential 0.
-
-    Args:
-        cycle: Preconditioner, whose finest grid is the problem.
-        source: See `potentials`.
-
-    Attributes:
-        flow: Flows that potentials dissipate, to rounding of the sum of all links to the source.
-    """
-
-    def __init__(self, cycle: _Cycle, source: Array) -> None:
-        self._cycle, self._grid = cycle, cycle.grids[0]
-        self._residual = np.stack([source[:, i::2, j::2] for i, j in _PARITIES], axis=1)
-        self._potential = np.zeros_like(self._residual)
-        self._along, self._out = _Cells(self._grid.shape, float), np.empty_like(self._residual)
-        shape = self._grid.shape
-        self._right: Parts = {one: np.empty(shape, np.float32) for one in _PARITIES}
-        self._step, self._work = {one: np.empty(shape) for one in _PARITIES}, np.empty(shape)
-        self._before, self.flow = np.zeros(len(source)), source.sum(axis=(1, 2))
-        self._changes: list[Array] = []
-
-    def step(self) -> Array:
-        """Iterate once, and return what the last iterations changed the flows by."""
-        residual, along, grid = self._residual, self._along, self._grid
-        scale = np.maximum(residual.max(axis=(1, 2, 3)), -residual.min(axis=(1, 2, 3)))
-        scale = scale[:, None, None] + np.finfo(float).tiny
-        for k, one in enumerate(_PARITIES):
-            np.divide(residual[:, k], scale, out=self._right[one], casting="same_kind")
-        guess = self._cycle(self._right)
-        now, work = np.zeros(len(scale)), self._work
-        for k, one in enumerate(_PARITIES):
-            np.multiply(guess[one], scale, out=self._step[one])
-            now += np.einsum("nxy,nxy->n", residual[:, k], self._step[one])
-        again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
-        self._before = now
-        for one in _PARITIES:
-            own = along.own[one]
-            own *= again[:, None, None]
-            own += self._step[one]
-            along.wrap(one)
-        power = np.zeros_like(now)
-        for k, one in enumerate(_PARITIES):
-            out = np.multiply(grid.diagonal[one], along.own[one], out=self._out[:, k])
-            for key, link in grid.links[one].items():
-                out -= np.multiply(link, along.beside[one][key], out=work)
-            power += np.einsum("nxy,nxy->n", along.own[one], out)
-        length = np.divide(now, power, out=np.zeros_like(now), where=power > 0.0)
-        for k, one in enumerate(_PARITIES):
-            part = np.multiply(along.own[one], length[:, None, None], out=work)
-            self._potential[:, k] += part
-            residual[:, k] -= np.multiply(self._out[:, k], length[:, None, None], out=work)
-        self._changes.append(length * now)
-        self.flow = self.flow - self._changes[-1]
-        last = max(2, len(self._changes) // 4)
-        return np.asarray(np.sum(self._changes[-last:], axis=0))
-
-    @property
-    def imbalance(self) -> Array:
-        """Sum of the absolute differences of what enters and leaves all cells, shape (n,)."""
-        return np.asarray(np.abs(self._residual).sum(axis=(1, 2, 3)))
-
-    @property
-    def potential(self) -> Array:
-        """The potential of all cells, shape (n, nx, ny)."""
-        count, _, nx, ny = self._potential.shape
-        found = np.empty((count, 2 * nx, 2 * ny))
-        for k, (i, j) in enumerate(_PARITIES):
-            found[:, i::2, j::2] = self._potential[:, k]
-        return found

@@ -234,6 +234,7 @@ def gap_flows(
     *,
     axes: Sequence[int] = (0, 1),
     periodic: bool = False,
+    tolerance: float = 1e-7,
 ) -> list[GapFlow]:
     """Solve Reynolds' equation for flows along several axes, which takes less than one by one.
 
@@ -242,6 +243,7 @@ def gap_flows(
         lengths: Likewise.
         axes: 0 for a flow along x, 1 along y.
         periodic: See `gap_flow`.
+        tolerance: Error of the flows that does no harm, relative to them.
 
     Raises:
         InputError: See `gap_flow`.
@@ -256,9 +258,9 @@ def gap_flows(
     found = None
     shorter, longer = sorted(gap.shape)
     if shorter**2 > _MOST_FACTORISED and longer <= _THIN * shorter:
-        from patchlaw.micro.gap_multigrid import cell_flows  # small maps do without
+        from patchlaw.micro.gap_iteration import cell_flows  # small maps do without
 
-        found = cell_flows(open_gap, lengths, axes, periodic=periodic)
+        found = cell_flows(open_gap, lengths, axes, periodic=periodic, tolerance=tolerance)
     if found is None:
         found = [_factorised_flow(open_gap, lengths, axis, periodic) for axis in axes]
     return [

@@ -10,11 +10,12 @@ Theory: docs/theory.md, section 16.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import Start
@@ -24,21 +25,26 @@ from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support import Array, Flags, shared
 
-_CELL = 1000.0
+_CELL, _TABLED = 1000.0, 320.0
 """Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
-not converge. That took 520 on up to 192² cells and 290 on more, 800 and 430 on 130² and 513², which
-are filled up to 160² and 640²; maps of up to 72² cells, with factors of bands, 6 MB at most."""
+not converge. That took 400 on up to 192² cells and 220 on more; maps of up to 72² cells, with
+factors of bands, 6 MB at most. And what a table of leaks keeps for every cell of its samples [B]:
+pressures that further rows start from on all grids, and gaps on the finest, of 20 to 27 rows."""
 
 
-def flow_memory(cells: int) -> float:
+def flow_memory(cells: int, tabled: int = 0) -> float:
     """Return the memory that flows through a map of gaps take [B].
 
     Args:
         cells: Number of cells.
+        tabled: Number of cells of samples whose leaks a process tabulates.
     """
-    return cells * _CELL
+    return cells * _CELL + tabled * _TABLED
 
 
+ROUGH = 1e-4
+"""Error of flows that does no harm where they tell an error, or lie in a table whose rows tell them
+to some 10⁻³."""
 _QUARTER, _LEAST, _ENDS, _APART = 0.75, 0.02, 2.0, 3.0
 """Parts that the error of a flow is at least: of the power by which it changes from a quarter to
 half as many cells a side, as either change may vanish by chance; of the flow; and of the flow next
@@ -97,7 +103,7 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
 _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
-_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 4e-3, 8
+_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.5, 8e-3, 8
 """Rows are added on both sides of one whose T those beside it miss by more than this part of it,
 and of the error of the grid, or of T where that is less, until they are as near as this part of the
 separation at first touch, in so many passes at most. On six samples, isotropic and turned, 9 to 12
@@ -107,6 +113,8 @@ _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
 """Approaches of a whole surface, from first touch to the largest load."""
+_TOLERANCE = 1e-5
+"""Tolerance of contacts in tables: T differs by 10⁻⁶ of itself, and by 10⁻⁴ next to closing."""
 _FEWEST_CELLS = 16
 """Cells along a side below which half of them are not tried."""
 
@@ -144,10 +152,9 @@ def sample_transmissivity(
     rows = _solved(samples, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
-        error = np.minimum(error_of_grid(known, *coarser), known)
-        allowed = np.maximum(_OFF * known, _OF_GRID * error)
-        off = _missed(separation, known, allowed)
-        closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
+        error = error_of_grid(known, *coarser)
+        off = _missed(separation, known, np.maximum(_OFF * known, _OF_GRID * error))
+        closes = ((known[:-1] > error[:-1]) & (known[1:] == 0.0)).any(axis=1)
         wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
         wide &= known[:-1].any(axis=1)
         if not wide.any():
@@ -287,8 +294,10 @@ class _Sample:
         nx, ny = model.surface.grid
         if coarser > 1 and min(nx, ny) >= _FEWEST_CELLS:
             model = model.resampled((nx // coarser, ny // coarser))
-        self._model, self._starts = model, dict[float, Start]()
-        self._known: dict[float, tuple[Array, float]] = {}
+        self._model = replace(model, tolerance=max(model.tolerance, _TOLERANCE))
+        self._starts: dict[float, Start] = {}
+        self._known: dict[float, tuple[NDArray[np.float32], float]] = {}
+        self._widens = coarser == 1
 
     def rows(self, separations: Array, *, widened: bool = False) -> Array:
         """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3)."""
@@ -299,7 +308,8 @@ class _Sample:
                 break
             gap, found[row, 2] = self._pressed(separation)
             gap = widened_gap(gap, periodic=True) if widened else gap
-            found[row, :2] = [one.transmissivity for one in gap_flows(gap, lengths, periodic=True)]
+            flows = gap_flows(gap, lengths, periodic=True, tolerance=ROUGH)
+            found[row, :2] = [one.transmissivity for one in flows]
             if not found[row, :2].any():
                 break
         return found
@@ -314,13 +324,14 @@ class _Sample:
             approach = _separation(model, 0.0) - separation
             if approach <= model.first_touch:
                 gap, pressure = separation + surface.mean_height - surface.heights, 0.0
-                gap = np.maximum(gap, 0.0)
-            else:
-                (state,) = press_along(model, approach, known=self._starts)
-                self._starts[approach] = state.guess
-                gap, pressure = state.open_gap, state.mean_pressure
-            self._known[separation] = gap, pressure
-        return self._known[separation]
+                return np.maximum(gap, 0.0), pressure
+            (state,) = press_along(model, approach, known=self._starts)
+            self._starts[approach] = state.guess
+            if not self._widens:
+                return state.open_gap, state.mean_pressure
+            self._known[separation] = state.open_gap.astype(np.float32), state.mean_pressure
+        gap, pressure = self._known[separation]
+        return gap.astype(float), pressure
 
 
 def patch_transmissivities(
@@ -388,7 +399,7 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> list[float]:
         parts.append(slice(place * cells // count, -(-(place + 1) * cells // count)))
         sides.append(length * (parts[-1].stop - parts[-1].start) / cells)
     own, lengths = gap[parts[0], parts[1]], (sides[0], sides[1])
-    return [flow.transmissivity for flow in gap_flows(own, lengths)]
+    return [flow.transmissivity for flow in gap_flows(own, lengths, tolerance=ROUGH)]
 
 
 def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:

@@ -179,7 +179,9 @@ class About:
             from patchlaw.multiscale.laws.transmissivity import flow_memory  # others do without
 
             each = parts.patches.count if scene.by_laws else 1  # laws have a map for every patch
-            leak = flow_memory(math.prod(parts.cells or parts.surface.grid) // each)
+            sizes = [one.heights.size for region in parts.samples for one in region.surfaces]
+            tabled = max(max(sizes), sum(sizes) // ranks) if sizes else 0
+            leak = flow_memory(math.prod(parts.cells or parts.surface.grid) // each, tabled)
         requests = self.memory_requests()
         return memory_statement(parts, self.contact_memory, requests, program, ranks, leak)
 

@@ -31,7 +31,7 @@ import numpy as np
 
 from patchlaw.micro.transport import GapFlow, cell_network, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
-from patchlaw.multiscale.laws.transmissivity import error_of_grid, next_to_closing
+from patchlaw.multiscale.laws.transmissivity import ROUGH, error_of_grid, next_to_closing
 from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
@@ -199,7 +199,9 @@ class GapLeakObserver(LeakObserver):
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
         def rates(gap: Array | None) -> Array:
             comm = self._coupling.comm
-            return np.array(on_root_alone(comm, lambda: list(map(self._rate, self._through(gap)))))
+            return np.array(
+                on_root_alone(comm, lambda: list(map(self._rate, self._through(gap, ROUGH))))
+            )
 
         if cause == _WEAR:
             return list(rates(self._coupling.other_gap(step, worn=True)))
@@ -210,12 +212,13 @@ class GapLeakObserver(LeakObserver):
             wider = rates(None if gap is None else widened_gap(gap, periodic=periodic))
         return list(own + error_of_grid(own, half, quarter, wider))
 
-    def _through(self, gap: Array | None) -> list[GapFlow]:
+    def _through(self, gap: Array | None, tolerance: float = 1e-7) -> list[GapFlow]:
         """Return the flows through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
         axes = ["xy".index(way) for way in self._section.directions]
         lengths = self._coupling.parts.surface.lengths
-        return gap_flows(gap, lengths, axes=axes, periodic=self._coupling.scene.surface.periodic)
+        periodic = self._coupling.scene.surface.periodic
+        return gap_flows(gap, lengths, axes=axes, periodic=periodic, tolerance=tolerance)
 
     def _rate(self, flow: GapFlow) -> float:
         return flow.rate(self._section.drop, self._section.viscosity_MPa_s)

@@ -38,6 +38,7 @@ FLOORS = {
     ],
     "micro": [
         "closed_forms gap_multigrid",
+        "gap_iteration",
         "transport",
         "boundary_elements model",
         "asperities complementarity",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro import gap_multigrid, transport
+from patchlaw.micro import gap_iteration, transport
 from patchlaw.micro.transport import gap_flows
 
 
@@ -60,7 +60,7 @@ def test_parallel_plates_let_the_cube_of_their_gap_through(monkeypatch):
 
 
 def test_what_does_not_converge_is_factorised(monkeypatch):
-    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 3)
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 3)
     for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
         assert one.transmissivity == other.transmissivity
 
@@ -79,15 +79,28 @@ def test_slow_maps_end_no_earlier(monkeypatch):
     assert along_x[0].transmissivity == pytest.approx(along_x[1].transmissivity, rel=1e-8, abs=0)
 
 
+def test_flows_stay_within_a_looser_tolerance(monkeypatch):
+    """Their iterations end earlier then."""
+    found = {}
+    for allowed in (1e-4, 1e-7):
+        found[allowed], exact = zip(
+            *both(channels((50, 50), 36, 0.34), monkeypatch, periodic=True, tolerance=allowed),
+            strict=True,
+        )
+        for one, other in zip(found[allowed], exact, strict=True):
+            assert one.transmissivity == pytest.approx(other.transmissivity, rel=allowed, abs=0)
+    assert found[1e-4][0].transmissivity != found[1e-7][0].transmissivity
+
+
 def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
     """What was added to 97 cells took more than twice as many as chains of 15 cells."""
-    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 16)
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 16)
     for count in (96, 97, 111):
         gap = channels((count, count), 1, 0.1)
-        assert gap_multigrid.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
+        assert gap_iteration.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
 
 
 def test_thin_maps_are_factorised(monkeypatch):
-    monkeypatch.delattr(gap_multigrid, "cell_flows")
+    monkeypatch.delattr(gap_iteration, "cell_flows")
     for flow in gap_flows(np.full((3, 4000), 1e-3), (0.003, 4.0), periodic=True):
         assert flow.flow_factor == pytest.approx(1.0, rel=1e-7)
