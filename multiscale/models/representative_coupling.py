@@ -18,6 +18,7 @@ from patchlaw.geometry import Control, Friction, Surface, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
+from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_samples import representative_laws
@@ -65,6 +66,7 @@ class RepresentativeCoupling(Coupling):
     ) -> None:
         super().__init__(parts, comm, meshes, nodes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
+        self._elsewhere: dict[str, tuple[Any, Any, Any]] = {}
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face
             with located(self.scene, "counter_body.contact"):
@@ -143,6 +145,7 @@ class RepresentativeCoupling(Coupling):
             "new_laws": model.table.laws,
             "zero": self.parts.zero_error,
             "coarser": self._worn_on_fewer if samples is not self.parts.samples else {},
+            "elsewhere": self._elsewhere,
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,
@@ -164,6 +167,15 @@ class RepresentativeCoupling(Coupling):
             of_wear = WearErrors(model.wear_errors, known, zones, one_law)
             found = found.with_wear(step, past, of_wear)
         return error_columns(step, found)
+
+    def release(self) -> None:
+        """Free the bodies, and others that told their errors."""
+        faces = [face for face, *_ in self._elsewhere.values() if face is not None]
+        others = [side.body for face in faces for side in face.sides]
+        self._elsewhere.clear()
+        faces.clear()
+        free_bodies(others)
+        super().release()
 
     # --- laws and load steps
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -62,16 +63,19 @@ _OF_BEYOND = 1.5
 linear ones over the change from half as many cells along every side, and of quadratic ones over the
 change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random. The last is of linear
 ones over what displacements change that only quadratic ones have, 0.7 to 1 of the whole."""
-_BY_CREASES, _MOST_REFINED_UNKNOWNS = 3e-3, 20_000
+_BY_CREASES, _MOST_KEPT_UNKNOWNS = 3e-3, 20_000
 """Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
-have so many unknowns at most. Creases between the facets of a faceted side disturb a uniform stress
+have so many unknowns at most; other elements with so many are kept for later load steps. Creases between the facets of a faceted side disturb a uniform stress
 by 1e-4 to 1e-3 in places that no degree of elements resolves on the same mesh."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _KNOWN = 13
 """Numbers that a sample on its cells tells: two errors of the force, the width at edges, the force;
 errors of what is read off by cells and by slopes, three each; what is read off under the mean
-pressure."""
+pressure. Of gaps they are over that of the law."""
+_ROUNDED = 1.2
+"""Ratio of pressures that samples are solved under: their errors, relative to the pressure and to
+what is read off, hardly change from one to the next."""
 PLACES = 401
 """Places on a law that its closure or stiffness at a pressure is read off between."""
 _TOLD = 0.57
@@ -96,6 +100,7 @@ class SampleCells:
         has_edges: Whether the contact face ends at free edges.
 
     Attributes:
+        told: What the samples of a region tell, and their areas, by their law and its closure.
         ends: By what tells cells from others, the last two ends of paths in shear that were gone on
             them, each with the way to it.
     """
@@ -103,6 +108,7 @@ class SampleCells:
     model: HalfSpaceModel
     finite_slopes: bool
     has_edges: bool
+    told: dict[Hashable, tuple[Array, Array]] = field(default_factory=dict, init=False)
     ends: dict[Hashable, list[tuple[list[Control], Any]]] = field(default_factory=dict, init=False)
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
@@ -185,6 +191,7 @@ class LawErrorProbe:
         tell: Told how many of the samples are done, in percent.
         zero: Error of the height that approaches count from [mm].
         coarser: By the id of a worn sample those that wore on half and on a quarter of its cells.
+        elsewhere: By name other faces of small bodies, each with laws and the problem there.
         comm: MPI communicator; None for this process alone.
     """
 
@@ -201,6 +208,7 @@ class LawErrorProbe:
     tell: ProgressObserver = unobserved
     zero: float = 0.0
     coarser: Mapping[int, Sequence[Surface]] = field(default_factory=dict)
+    elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
     comm: Any = None
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
@@ -278,11 +286,15 @@ class LawErrorProbe:
         errors = np.array([share, share / self._gaps_by, share])
         if not math.isfinite(share) or not share:
             return errors
-        known, sizes = self._read_off(0.0), np.ones(3)
+        known, sizes = self._as_read, np.ones(3)
         moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
         sizes[::2] = known[::2]
         moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
         return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
+
+    @cached_property
+    def _as_read(self) -> Array:
+        return self._read_off(0.0)
 
     def _read_off(self, share: float) -> Array:
         """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
@@ -291,10 +303,7 @@ class LawErrorProbe:
         """
         sampling = self.response.sampling
         pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
-        closure, found = (
-            self._closures_under(pressure, sampling.patch),
-            np.zeros((3, len(pressure))),
-        )
+        closure, found = self._closures_under(pressure, sampling.patch), np.zeros((3, len(pressure)))
         for region, law in enumerate(self.table.laws):
             here = sampling.patch == region
             point = law.at(closure[here], extend=True)
@@ -393,23 +402,31 @@ class LawErrorProbe:
         from patchlaw.macro.contact import other_elements as on
 
         own, known = on.bodies_of(self.face), self.answer
-        points = known + self.by_points(on.face_on(self.face, lambda body: body, finer=True))
+        points = known + self.by_points()
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
-            lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
-            mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
+            linear = partial(on.face_on, choose=lambda b: b.linear if b.degree == 2 else b)
+            mesh += OF_QUADRATIC * np.abs(self._answer_of_kind("linear", linear) - known)
         if any(body.degree == 1 for body in own):
-            error, quadratic = self._of_linear(own, points)
+            error, quadratic = self._of_linear(points)
             mesh, below = mesh + error, np.abs(quadratic - points)
-        if mesh[0] < _BY_CREASES * abs(known[0]):
-            mesh = np.maximum(mesh, below + self._of_creases(quadratic))
+        if mesh[0] < _BY_CREASES * abs(known[0]) and 8 * self._most <= _MOST_KEPT_UNKNOWNS:
+            # creases, by quadratic elements on cells cut into eight
+            if (found := self._answer_of_kind("cut", on.refined_face, same=False)) is not None:
+                mesh = np.maximum(mesh, below + OF_REFINED * np.abs(found - quadratic))
         return mesh, np.abs(points - known)
 
-    def _of_linear(self, own: Sequence[Any], points: Array) -> tuple[Array | float, Array]:
+    @cached_property
+    def _most(self) -> int:
+        """Unknowns of the bodies with quadratic elements; collective."""
+        from patchlaw.macro.contact import other_elements as on
+
+        return sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
+
+    def _of_linear(self, points: Array) -> tuple[Array | float, Array]:
         """Return the errors of linear elements, infinite where they are not measured.
 
         Args:
-            own: The bodies.
             points: The answer on them with a finer quadrature.
 
         Returns:
@@ -417,51 +434,61 @@ class LawErrorProbe:
         """
         from patchlaw.macro.contact import other_elements as on
 
-        other: Any
-        if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
-            other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
-            found = self.answer_on(other)
-            error = _OF_BEYOND * np.abs(found - points)
-        elif (other := on.face_on_half(self.face)) is not None:
-            found = self.answer_on(other, same=False)
-            error = OF_HALF * np.abs(found - self.answer)
-        else:
-            return math.inf, points
-        made = [body for body in on.bodies_of(other) if all(body is not one for one in own)]
-        del other
-        free_bodies(made)
-        return error, found
+        def raised(face: Any) -> Any:
+            return on.face_on(face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
 
-    def _of_creases(self, quadratic: Array) -> Array | float:
-        """Return what quadratic elements err by on a coarse mesh, by cutting its cells into eight.
+        if self._most <= MOST_CHECKED_UNKNOWNS:
+            found = self._answer_of_kind("quadratic", raised)
+            return _OF_BEYOND * np.abs(found - points), found
+        found = self._answer_of_kind("half", on.face_on_half, same=False)
+        if found is None:
+            return math.inf, points
+        return OF_HALF * np.abs(found - self.answer), found
+
+    def _answer_of_kind(self, kind: str, make: Callable[[Any], Any], same: bool = True) -> Any:
+        """Return the answer on another face, None where there is none; see `answer_on`."""
+        with self._other(kind, make) as problem:
+            return None if problem is None else self.answer_on(problem, same=same)
+
+    @contextmanager
+    def _other(self, kind: str, make: Callable[[Any], Any]) -> Iterator[Any]:
+        """Lend the problem on another face; faces of small bodies are kept to the next load step.
 
         Args:
-            quadratic: The answer on quadratic elements.
+            kind: Name of the face.
+            make: Makes it from that of the run; None where there is none.
         """
         from patchlaw.macro.contact import other_elements as on
 
-        unknowns = sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
-        cut = on.refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
-        if cut is None:
-            return 0.0
-        made, found = on.bodies_of(cut), self.answer_on(cut, same=False)
-        del cut
+        kept = self.elsewhere
+        face, table, problem = kept.pop(kind, None) or (make(self.face), None, None)
+        if face is not None and table is not self.table:
+            problem = self.problem_with(face, self.table)
+        yield problem
+        own = on.bodies_of(self.face)
+        if face is None or self._most <= _MOST_KEPT_UNKNOWNS:
+            kept[kind] = face, self.table, problem
+            return
+        made = [body for body in on.bodies_of(face) if all(body is not one for one in own)]
+        del face, problem
         free_bodies(made)
-        return OF_REFINED * np.abs(found - quadratic)
 
     def _by_zero(self) -> Array:
         """Return what the answer errs by as a held plane may be nearer by the error of the zero."""
         if self.step.by_force or not self.zero:
             return np.zeros_like(self.answer)
-        return np.abs(self.answer_on(self.face, nearer=self.zero) - self.answer)
+        with self._other("nearer", lambda face: face) as problem:
+            return np.abs(self.answer_on(problem, nearer=self.zero) - self.answer)
 
-    def by_points(self, finer: Any) -> Array:
-        """Return what more quadrature points change in the answer, to first order.
+    def by_points(self) -> Array:
+        """Return what more quadrature points change in the answer, to first order."""
+        return self._borne_on_finer() - self._borne(self.problem)
 
-        Args:
-            finer: The face with them.
-        """
-        return self._borne(self.problem_with(finer, self.table)) - self._borne(self.problem)
+    def _borne_on_finer(self) -> Array:
+        from patchlaw.macro.contact import other_elements as on
+
+        with self._other("finer", lambda f: on.face_on(f, lambda body: body, finer=True)) as finer:
+            return self._borne(finer)
 
     def _borne(self, problem: LawContactProblem) -> Array:
         """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
@@ -472,26 +499,37 @@ class LawErrorProbe:
         """What discretisation may be off by: the force, shape (1,) [N]."""
         return np.array([self.state.force])
 
-    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
+    def answer_on(
+        self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
+    ) -> Array:
         """Return the answer on another face, under the same plane.
 
         Args:
-            face: The face.
+            problem: The problem there.
             same: Whether its meshes are the same. On more unknowns the answer is then that to first
                 order.
             nearer: How much nearer the plane is [mm].
         """
+        if self.begins_on(problem, same=same):
+            step = self.control, self.problem, self.response
+            return np.array([problem.first_order_force(*step)])
+        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
+
+    def begins_on(self, problem: LawContactProblem, *, same: bool) -> bool:
+        """Let a problem begin where the load step is; tell whether its end follows to first order.
+
+        Args:
+            problem: The problem.
+            same: Whether its meshes are the same.
+        """
         from patchlaw.macro.contact import other_elements as on
 
-        problem = self.problem_with(face, self.table)
-        if same:
-            on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
-            if face.body.dofs > self.face.body.dofs:
-                step = self.control, self.problem, self.response
-                return np.array([problem.first_order_force(*step)])
-        else:
+        if not same:
             problem.start_from(self.state.patch_pressure)
-        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
+            return False
+        state = self.control.body_state
+        on.start_from_elements(problem, self.state, self.face, state)
+        return bool(problem.face.body.dofs > self.face.body.dofs)
 
     # --- samples
 
@@ -512,14 +550,21 @@ class LawErrorProbe:
         """
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
-        tell = partial(self._told_by, closures=closures)
-        for number, own, areas in self.of_regions("check of samples", tell, list(forces > 0.0)):
+        laws, known = self.table.laws, self.cells.told
+        places = [(law, _rounded(law, at)) for law, at in zip(laws, closures, strict=True)]
+        unknown = [f > 0.0 and at not in known for f, at in zip(forces, places, strict=True)]
+        tell = partial(self._told_by, closures=[closure for _, closure in places])
+        for number, *told in self.of_regions("check of samples", tell, unknown):
+            known[places[number]] = told
+        for number in np.flatnonzero(forces > 0.0):
+            own, areas = known[places[number]]
             sums[:, number] = own[:, :4].sum(axis=0)
-            weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
-            of_regions["grid"] += weights @ own[:, 4:7]
-            of_regions["slopes"] += weights @ own[:, 7:10]
-            scatter = _scatter(areas, own[:, 10:])
-            of_regions["samples"] += factors[number] * scatter * forces[number] / whole
+            gap = _gap(laws[number], closures[number])
+            part = forces[number] / whole * np.array([1.0, gap, 1.0])
+            weights = own[:, 3] / (own[:, 3].sum() or 1.0)
+            of_regions["grid"] += part * (weights @ own[:, 4:7])
+            of_regions["slopes"] += part * (weights @ own[:, 7:10])
+            of_regions["samples"] += part * factors[number] * _scatter(areas, own[:, 10:])
         means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
         return np.array([*means, sums[2]]), of_regions
 
@@ -549,15 +594,16 @@ class LawErrorProbe:
             areas = [sample.area for sample in samples[number].surfaces]
             yield number, np.array(own), np.array(areas)
 
-    def _told_by(self, number: int, sample: Surface, closures: Array) -> Array:
+    def _told_by(self, number: int, sample: Surface, closures: Sequence[float]) -> Array:
         """Return what a sample on its cells tells, shape (_KNOWN,).
 
         Args:
             number: Number of its region.
             sample: The sample.
-            closures: Mean closures of the regions, shape (regions,) [mm].
+            closures: Closures of the regions, shape (regions,) [mm].
         """
         region, law, closure = self.samples[number], self.table.laws[number], closures[number]
+        sizes = np.array([1.0, _gap(law, closure), 1.0])
         probe, known = self.cells.probe_of(region, sample), np.zeros(_KNOWN)
         reference = probe.model.reference_height - sample.mean_height
         approach = reference - separation_of(law, float(closure), reference)
@@ -567,7 +613,7 @@ class LawErrorProbe:
             known[2] = self.cells.edge_width_of(region, sample, pressure)
         if len(region.surfaces) > 1:
             mean = Control(force=pressure * sample.area)
-            known[10:] = _read(model, model.press(mean, start=state.guess))
+            known[10:] = _read(model, model.press(mean, start=state.guess)) / sizes
         if not state.force:  # the closure is that of others of the samples
             return known
         area, _, stiffness = _read(model, state)
@@ -583,8 +629,8 @@ class LawErrorProbe:
         ).by_cause
         known[3] = state.force
         for row, cause in enumerate(("grid", "slopes")):
-            known[row], area_error, gap_error, stiffer = errors[cause][:4]
-            known[4 + 3 * row : 7 + 3 * row] = area_error / area, gap_error, stiffer
+            known[row], *others = errors[cause][:4]
+            known[4 + 3 * row : 7 + 3 * row] = others / sizes / [area, 1.0, 1.0]
         return known
 
     def _by_cells(
@@ -625,6 +671,21 @@ def nearer_by(control: Control, distance: float) -> Control:
     return replace(control, approach=control.approach + distance)
 
 
+def _rounded(law: PatchLaw, closure: float) -> float:
+    """Return the closure of a law at the nearest power of `_ROUNDED` to its pressure [mm]."""
+    if not (pressure := float(law.pressure(closure))):
+        return closure
+    power = _ROUNDED ** round(math.log(pressure, _ROUNDED))
+    closures = np.linspace(*law.range, PLACES)
+    return float(np.interp(power, law.pressure(closures), closures))
+
+
+def _gap(law: PatchLaw, closure: float) -> float:
+    """Return the mean gap of a law at a closure, or the least one that samples are judged at."""
+    point = law.at(closure, extend=True)
+    return max(float(point.separation), _LEAST_SEPARATION * law.initial_separation)
+
+
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
     """Return area fraction, mean gap [mm] and stiffness −dp/dū [MPa/mm] of a sample."""
     stiffness = model.stiffness(state, turns=False).interface or math.nan
@@ -634,7 +695,7 @@ def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, flo
 def _scatter(areas: Array, read: Array) -> Array:
     """Return standard deviations of area, mean gap and stiffness among samples, shape (3,).
 
-    Those of area and stiffness are relative; 0 of a single sample.
+    Those of area and stiffness are relative, those of the gap as it is; 0 of a single sample.
 
     Args:
         areas: Areas of the samples, which they count by, shape (n,) [mm²].
