@@ -28,7 +28,8 @@ _LEAST, _MOST, _ROWS = 0.125, 8.0, 7
 """Least and largest pressure that the law is known at, over the mean one, and their number."""
 _ROUNDING = 1e-9
 """Growth of closures, over the largest, that may be rounding."""
-_STEPS, _TOLERANCE = 60, 1e-9
+_STEPS, _TOLERANCE, _RESIDUAL = 60, 1e-9, 1e-5
+"""Most steps of Newton's method on the law, its residual, and that of the contacts."""
 
 
 def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> float:
@@ -43,7 +44,7 @@ def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> fl
         NotConverged: When a contact problem cannot be solved.
     """
     nx, ny = (min(count, _MOST_CELLS) for count in model.surface.grid)
-    period = model.resampled((nx, ny))
+    period = replace(model.resampled((nx, ny)), tolerance=_RESIDUAL)
     heights = np.tile(period.surface.heights, (_PERIODS, _PERIODS))
     lengths = _PERIODS * model.surface.lengths[0], _PERIODS * model.surface.lengths[1]
     sides = FreeSides(
