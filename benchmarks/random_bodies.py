@@ -29,7 +29,7 @@ from patchlaw.macro.compat import mesh_from_cells
 from patchlaw.macro.mesh.from_file import refined
 from patchlaw.macro.mesh.tagged import cell_tags, facet_tags
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}

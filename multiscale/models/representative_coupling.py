@@ -31,13 +31,13 @@ from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
     LawErrorProbe,
-    SampleCells,
     causes_of,
     check_requests,
     omission_notes,
 )
+from patchlaw.multiscale.models.measured_errors.samples import SampleCells
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts

@@ -39,12 +39,8 @@ from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.models.measured_errors.samples import (
-    PLACES,
-    LawErrorProbe,
-    nearer_by,
-    separation_of,
-)
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe, nearer_by
+from patchlaw.multiscale.models.measured_errors.samples import PLACES, separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,

@@ -12,15 +12,14 @@ from scipy.stats import norm
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.models.measured_errors import samples as law_errors
+from patchlaw.multiscale.models.measured_errors import faces as law_errors
 from patchlaw.multiscale.models.measured_errors.errors import response_of
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
     LawErrorProbe,
     check_requests,
-    interpolation_errors,
-    mean_error,
     omission_notes,
 )
+from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
 from patchlaw.multiscale.readable import quantity
 from patchlaw.support import InputError
 
