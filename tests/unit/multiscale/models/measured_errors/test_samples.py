@@ -210,7 +210,7 @@ class NearlyClosed:
 
     range = 0.0, 1.2 - 1.0 / 25.0
 
-    def at(self, closure, extend):
+    def at(self, _, closure, extend):
         gap = 1.2 - np.asarray(closure)
         pressure, area = 1.0 / gap - 1.0 / 1.2, np.full_like(gap, 0.999)
         return SimpleNamespace(
@@ -218,7 +218,7 @@ class NearlyClosed:
         )
 
     def pressure(self, closure):
-        return self.at(closure, True).pressure
+        return self.at(0, closure, True).pressure
 
 
 def test_gap_and_stiffness_near_full_contact_err_as_the_law_says_at_every_point():
@@ -232,7 +232,7 @@ def test_gap_and_stiffness_near_full_contact_err_as_the_law_says_at_every_point(
     probe = LawErrorProbe(
         **dict.fromkeys(("problem", "face", "problem_with", "cells")),
         state=SimpleNamespace(sample_pressure=pressure, force=force),
-        table=SimpleNamespace(laws=[NearlyClosed()]),
+        table=SimpleNamespace(laws=[law := NearlyClosed()], together=lambda: law),
         samples=(),
         new_laws=(),
         step=SimpleNamespace(interface_stiffness_N_per_mm=stiffness),
