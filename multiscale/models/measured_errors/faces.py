@@ -354,7 +354,7 @@ class LawErrorProbe(SampleProbe):
 
         kept = self.elsewhere
         face, table, problem = kept.pop(kind, None) or (make(self.face), None, None)
-        if face is not None and table is not self.table:
+        if face is not None and (problem is None or table is not self.table):
             problem = self.problem_with(face, self.table)
         yield problem
         own = on.bodies_of(self.face)
