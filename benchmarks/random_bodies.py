@@ -29,7 +29,7 @@ from patchlaw.macro.compat import mesh_from_cells
 from patchlaw.macro.mesh.from_file import refined
 from patchlaw.macro.mesh.tagged import cell_tags, facet_tags
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}
@@ -326,13 +326,6 @@ def problem_on(body, mesh):
     return face, lambda other: LawContactProblem(other, [body.law], "pointwise")
 
 
-class _OfForce(LawErrorProbe):
-    """Measures the errors of the force alone, under laws that know neither area nor gap."""
-
-    def _read_off(self, problem, state):
-        return np.zeros(2)
-
-
 def stated_and_true(body, comm, *, refinements=2):
     """Return the measured errors of a random body, and the forces on refined meshes.
 
@@ -350,7 +343,7 @@ def stated_and_true(body, comm, *, refinements=2):
     problem = problem_of(face)
     load = body.pressure * float(face.areas.sum())
     state = problem.solve(Control(force=load, tilt=body.tilt))
-    probe = _OfForce(
+    probe = LawErrorProbe(
         problem=problem,
         face=face,
         state=state,

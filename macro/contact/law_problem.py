@@ -110,6 +110,7 @@ class LawContactProblem:
             that converges; None: none. Tangents are unsymmetric with it, and GMRES solves for them.
 
     Attributes:
+        face: The patches.
         sampling: Where the laws are evaluated.
         sliders: The sliders of the face, with what load steps left behind; None without friction.
         stated: What the latest load step prescribes, without the moments of what pulls the body.
@@ -134,7 +135,7 @@ class LawContactProblem:
             raise InputError(
                 "every patch needs a law", value=len(laws), allowed=f"{face.patches.count}"
             )
-        self._face = face
+        self.face = face
         self._preload: Array | None = None
         self.stated = Control(approach=0.0)
         self.forces = ContactForces(face, mode, laws, crown, friction)
@@ -204,7 +205,7 @@ class LawContactProblem:
         """Return a control with the moments of what pulls the body, where the plane turns."""
         if not control.free[1:].any():
             return control
-        x, y = np.add(control.moment, self._face.pull_moments(control.body_state)).tolist()
+        x, y = np.add(control.moment, self.face.pull_moments(control.body_state)).tolist()
         return replace(control, moment=(x, y))
 
     def _checked_reaction(
@@ -216,7 +217,7 @@ class LawContactProblem:
         self.forces.write_stresses(state.sample_pressure, stress, load)
         self.forces.write_on_supports(state.sample_pressure, stress, on_supports)
         return checked_reaction(
-            self._face,
+            self.face,
             displacement,
             load,
             on_supports,
@@ -502,7 +503,7 @@ class LawContactProblem:
         residual, between = guess.duplicate(), guess.duplicate()
         self.equilibrium.residual(guess, residual)
         self.equilibrium.update_tangent(guess)
-        own, others = ([one.body for one in problem._face.sides] for problem in (self, lower))
+        own, others = ([one.body for one in problem.face.sides] for problem in (self, lower))
         transfer = from_vertices(own, kept=others)
         between.array[:] = np.diff(transfer.getValuesCSR()[0]) > 1  # a vertex stays where it is
         body = self.equilibrium.body
@@ -727,8 +728,8 @@ class LawContactProblem:
             Collective.
         """
         sampling = self.sampling
-        values = together(self._face.comm, lambda: function(sampling.patch, self._closure))
-        return sampling.patch_sums(values) / self._face.areas
+        values = together(self.face.comm, lambda: function(sampling.patch, self._closure))
+        return sampling.patch_sums(values) / self.face.areas
 
     def patch_largest(self, function: Callable[[Indices, Array], Array]) -> Array:
         """Return the largest values of a function of closure on the patches, see `patch_means`.
@@ -744,4 +745,4 @@ class LawContactProblem:
         """
         sampling, largest = self.sampling, np.zeros(self.sampling.count)
         np.maximum.at(largest, sampling.patch, function(sampling.patch, self._closure))
-        return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
+        return np.asarray(np.max(self.face.comm.allgather(largest), axis=0))

@@ -173,7 +173,6 @@ def _tags_of(body: MeshedBody, facets: ContactFacets) -> Locals:
 
 def start_from_elements(
     problem: LawContactProblem,
-    face: ContactFace,
     known: FaceEquilibrium,
     before: ContactFace,
     body_state: float = 0.0,
@@ -182,7 +181,6 @@ def start_from_elements(
 
     Args:
         problem: The problem.
-        face: Its face.
         known: A solution.
         before: The face that it is of.
         body_state: Position among the states of the bodies' loads there.
@@ -190,7 +188,7 @@ def start_from_elements(
     Note:
         Collective.
     """
-    parts, pairs = [], zip(bodies_of(before), bodies_of(face), strict=True)
+    parts, pairs = [], zip(bodies_of(before), bodies_of(problem.face), strict=True)
     whole = before.body.split(known.displacement) if isinstance(before, FacePair) else None
     for part, (one, other) in zip(whole or [known.displacement], pairs, strict=True):
         parts.append(part if one is other else _carried(part, one, other))

@@ -216,10 +216,11 @@ class Convolution:
             field[..., here, :] = fft.irfft(work[..., here, :], n=my)[..., : self.grid[1]]
 
         size = work.itemsize * (4 if self._fields else 1)
-        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
+        least = 4 if work.nbytes > BLOCK else 1  # starting threads takes longer than small fields
+        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), least))
         # of a row two lines of the cache at least
-        in_threads(along_columns, blocks(work.shape[-1], max(BLOCK // mx, 128) // size, 4))
-        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
+        in_threads(along_columns, blocks(work.shape[-1], max(BLOCK // mx, 128) // size, least))
+        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), least))
         return field
 
     def _along_columns(self, part: Field, here: slice, loaded: Any) -> Field:

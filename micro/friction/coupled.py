@@ -25,7 +25,8 @@ from patchlaw.micro.half_space.read_off import rates_of_pressures
 from patchlaw.support import NotConverged
 
 TOLERANCE = 1e-6
-"""Change of the displacements across by a further pass, over the largest displacement."""
+"""Change of the displacements across by a further pass, over the largest displacement, at least;
+the tolerance of the friction where that is larger."""
 _MOST_PASSES = 120
 _MIXING: dict[str, Any] = {"memory": 60, "noise": np.inf, "dependent": 1e-4}
 """Mixing of the displacements across. Where friction holds far more than pressures pull, a pass
@@ -85,7 +86,7 @@ def press_coupled(
         apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), unseen)
         moved = float(np.abs(state.displacement).max())  # type: ignore[arg-type]
         change = float(apart.max()) / max(moved, float(np.finfo(float).tiny))
-        if change <= TOLERANCE:
+        if change <= max(TOLERANCE, friction.tolerance):
             state = replace(state, worn_depth=sum_of(worn, off) if friction.wear else worn)
             return replace(state, iterations=products - shear.products), shear
         displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))

@@ -18,6 +18,7 @@ from patchlaw.geometry import Control, Friction, Surface, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
+from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_samples import representative_laws
@@ -30,13 +31,13 @@ from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
     LawErrorProbe,
-    SampleCells,
     causes_of,
     check_requests,
     omission_notes,
 )
+from patchlaw.multiscale.models.measured_errors.samples import SampleCells
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
@@ -65,6 +66,7 @@ class RepresentativeCoupling(Coupling):
     ) -> None:
         super().__init__(parts, comm, meshes, nodes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
+        self._elsewhere: dict[str, tuple[Any, Any, Any]] = {}
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face
             with located(self.scene.file, "counter_body.contact"):
@@ -132,6 +134,7 @@ class RepresentativeCoupling(Coupling):
             "step": replace(step, interface_stiffness_N_per_mm=stiffness),
             "new_laws": model.table.laws,
             "zero": self.parts.zero_error,
+            "elsewhere": self._elsewhere,
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,
@@ -171,6 +174,15 @@ class RepresentativeCoupling(Coupling):
             samples = tuple(levels[level][one] for one, level in enumerate(nearest))
             found |= {"samples": samples, "coarser": self._worn_on_fewer}
         return found
+
+    def release(self) -> None:
+        """Free the bodies, and others that told their errors."""
+        faces = [face for face, *_ in self._elsewhere.values() if face is not None]
+        others = [side.body for face in faces for side in face.sides]
+        self._elsewhere.clear()
+        faces.clear()
+        free_bodies(others)
+        super().release()
 
     # --- laws and load steps
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.multiscale.loading.column import Mode, merged
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
     OF_QUADRATIC,

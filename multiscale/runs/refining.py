@@ -26,7 +26,7 @@ from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cell_coupling import CellCoupling
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
     OF_QUADRATIC,

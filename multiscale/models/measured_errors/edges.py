@@ -28,7 +28,8 @@ _LEAST, _MOST, _ROWS = 0.125, 8.0, 7
 """Least and largest pressure that the law is known at, over the mean one, and their number."""
 _ROUNDING = 1e-9
 """Growth of closures, over the largest, that may be rounding."""
-_STEPS, _TOLERANCE = 60, 1e-9
+_STEPS, _TOLERANCE, _RESIDUAL = 60, 1e-9, 1e-5
+"""Most steps of Newton's method on the law, its residual, and that of the contacts."""
 
 
 def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> float:
@@ -43,7 +44,7 @@ def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> fl
         NotConverged: When a contact problem cannot be solved.
     """
     nx, ny = (min(count, _MOST_CELLS) for count in model.surface.grid)
-    period = model.resampled((nx, ny))
+    period = replace(model.resampled((nx, ny)), tolerance=_RESIDUAL)
     heights = np.tile(period.surface.heights, (_PERIODS, _PERIODS))
     lengths = _PERIODS * model.surface.lengths[0], _PERIODS * model.surface.lengths[1]
     sides = FreeSides(
@@ -79,7 +80,7 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     law, (loads, closures) = _law_of(period, pressure)
     flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=face.surface.lengths)
     compliance = _compliance_of(replace(face, surface=flat, highest=None))
-    count = _COARSE**2
+    count = len(compliance)
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
     approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())
@@ -95,7 +96,7 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
         pressures, approach = pressures - change[:-1], approach - change[-1]
         if np.abs(residual).max() < _TOLERANCE * pressure:
             rise = np.linalg.solve(np.eye(count) + rate[:, None] * compliance, rate)
-            return float(approach), float(rise.sum() * flat.spacing[0] * flat.spacing[1])
+            return float(approach), float(rise.mean() * face.surface.area)
     raise NotConverged(
         "the law at the edge of a face",
         reason="its pressures were not found",
@@ -141,12 +142,14 @@ def _law_of(
 
 
 def _compliance_of(cells: HalfSpaceModel) -> Array:
-    """Return the displacements of all cells of a flat face by pressures on each, shape (n, n)."""
-    grid = cells.compliance.on_grid(cells.surface.grid, cells.surface.spacing)
-    units = np.empty((_COARSE,) * 4)
-    for x, y in np.ndindex(_COARSE // 2, _COARSE // 2):  # a rectangle is its own mirror image
+    """Return the displacements of a quarter of a flat face's cells, shape (n, n) [mm/MPa].
+
+    They are those by pressures on each and on its three mirror images.
+    """
+    grid, half = cells.compliance.on_grid(cells.surface.grid, cells.surface.spacing), _COARSE // 2
+    units = []
+    for x, y in np.ndindex(half, half):
         unit = np.zeros(cells.surface.grid)
-        unit[x, y] = 1.0
-        units[x, y] = moved = grid.displacement(unit)
-        units[~x, y], units[x, ~y], units[~x, ~y] = moved[::-1], moved[:, ::-1], moved[::-1, ::-1]
-    return np.asarray(units.reshape(_COARSE**2, -1).T)
+        unit[[x, ~x, x, ~x], [y, y, ~y, ~y]] = 1.0
+        units.append(grid.displacement(unit)[:half, :half].ravel())
+    return np.stack(units, axis=1)

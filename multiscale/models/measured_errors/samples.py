@@ -1,18 +1,9 @@
-"""Errors of load steps under laws of samples, by cause, measured in the run.
-
-Each cause is varied while all others stay, under the plane of the load step: elements of the body
-to first order from the known solution where they are linear, by another one where they are
-quadratic; the laws by what they err at the pressures of the step, and the quadrature by their
-pressures at more points. One linear solution tells what these change, to first order: the response
-of the contact to the approach, which tells the error of the approach, too.
-
-Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
-The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
-(docs/accuracy.md).
+"""What samples of laws err by: their cells, finite slopes, scatter and edges, told in the run.
 
 The cells and the finite slopes of samples are judged as those of any contact problem, by `contact`
-beside this module, at the mean closure of every region. The scatter among samples gives the error
-of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's t.
+beside this module, at the closure whose pressure is next to that of every region; what they tell
+there is kept. The scatter among samples gives the error of their mean that is not exceeded in 19 of
+20 sets of as many samples, by Student's t.
 
 Theory: docs/theory.md, section 13.
 """
@@ -22,66 +13,37 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.geometry.sliders import MOST_REMEMBERED
 from patchlaw.micro import FiniteSlopes, FrictionModel, HalfSpaceModel
-from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
+from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
-from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells, read
 from patchlaw.multiscale.models.measured_errors.edges import edge_width
-from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
-from patchlaw.multiscale.readable import WHOLE, Caution, ProgressObserver, unobserved
-from patchlaw.multiscale.scene.memory import body_request
-from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.models.measured_errors.errors import stated
+from patchlaw.multiscale.readable import WHOLE, ProgressObserver, unobserved
 from patchlaw.multiscale.scene.surfaces import RegionSamples
-from patchlaw.support import Array, Indices, NotConverged, shared
+from patchlaw.support import Array, NotConverged, shared
 
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from patchlaw.macro.contact.law_problem import ApproachResponse
-
-CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
-"""The causes, in their order."""
-MOST_CHECKED_UNKNOWNS = 400_000
-"""Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
-is measured for a block alone, by half of its cells along every side; that of modes is not told."""
-OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
-_OF_BEYOND = 1.5
-"""Errors of linear and of quadratic elements over the change of the force from one to the other, of
-linear ones over the change from half as many cells along every side, and of quadratic ones over the
-change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random. The last is of linear
-ones over what displacements change that only quadratic ones have, 0.7 to 1 of the whole."""
-_BY_CREASES, _MOST_REFINED_UNKNOWNS = 3e-3, 20_000
-"""Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
-have so many unknowns at most. Creases between the facets of a faceted side disturb a uniform stress
-by 1e-4 to 1e-3 in places that no degree of elements resolves on the same mesh."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _KNOWN = 13
 """Numbers that a sample on its cells tells: two errors of the force, the width at edges, the force;
 errors of what is read off by cells and by slopes, three each; what is read off under the mean
-pressure."""
+pressure. Of gaps they are over that of the law."""
+_ROUNDED = 1.2
+"""Ratio of pressures that samples are solved under: their errors, relative to the pressure and to
+what is read off, hardly change from one to the next."""
 PLACES = 401
 """Places on a law that its closure or stiffness at a pressure is read off between."""
-_TOLD = 0.57
-"""Memory of the products that tell the error of linear elements over that of a solve: 1230 of 2150
-B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
-_MOVED = 2.0
-"""Errors of area, gap and stiffness under the force over that of the force at the approach,
-relative, where elements and points move pressures about: up to 1.6 on a tilted slab of four
-elements, and up to 1.7 on four bodies drawn at random of cells of 1.5 times their usual length,
-where they were 0.9 to 2.5 at the approach."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
 
@@ -96,6 +58,7 @@ class SampleCells:
         has_edges: Whether the contact face ends at free edges.
 
     Attributes:
+        told: What the samples of a region tell, and their areas, by their law and its closure.
         ends: By what tells cells from others, the last two ends of paths in shear that were gone on
             them, each with the way to it.
     """
@@ -103,6 +66,7 @@ class SampleCells:
     model: HalfSpaceModel
     finite_slopes: bool
     has_edges: bool
+    told: dict[Hashable, tuple[Array, Array]] = field(default_factory=dict, init=False)
     ends: dict[Hashable, list[tuple[list[Control], Any]]] = field(default_factory=dict, init=False)
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
@@ -168,334 +132,26 @@ class SampleCells:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LawErrorProbe:
-    """Measures the errors of the latest load step on a face with laws of samples.
+class SampleProbe:
+    """Tells what samples of laws on their cells err by.
 
     Args:
-        problem: The body with the laws on its contact face, at the load step.
-        face: The contact face.
-        state: The contact there.
-        problem_with: Returns the problem on a face of the same bodies, with laws.
         table: The laws of the regions.
         samples: Their samples.
         cells: The contact problems on the cells of these.
-        step: The load step.
-        worn: Whether laws and samples are those of depths near to what has worn off.
-        new_laws: The laws of the samples before they wore; of new samples those of `table`.
-        tell: Told how many of the samples are done, in percent.
-        zero: Error of the height that approaches count from [mm].
         coarser: By the id of a worn sample those that wore on half and on a quarter of its cells.
+        tell: Told how many of the samples are done, in percent.
         comm: MPI communicator; None for this process alone.
     """
 
-    problem: LawContactProblem
-    face: LoadedFace | FacePair
-    state: FaceEquilibrium
-    problem_with: Callable[[Any, LawTable], LawContactProblem]
     table: LawTable
     samples: Sequence[RegionSamples]
     cells: SampleCells
-    step: LoadStep
-    worn: bool = False
-    new_laws: Sequence[PatchLaw]
-    tell: ProgressObserver = unobserved
-    zero: float = 0.0
     coarser: Mapping[int, Sequence[Surface]] = field(default_factory=dict)
+    tell: ProgressObserver = unobserved
     comm: Any = None
-    _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
-    @cached_property
-    def control(self) -> Control:
-        """What prescribes the plane of the load step, by its approach."""
-        return self.problem.same_approach()
-
-    def measure(self) -> MeasuredErrors:
-        """Measure the errors of the force at the approach.
-
-        A plane that is free to turn does so in every comparison.
-
-        Raises:
-            NotConverged: When one of the contact problems cannot be solved.
-
-        Note:
-            Collective.
-        """
-        if not self.state.force:
-            errors = dict.fromkeys(self.causes, np.zeros(4))
-            force = 0.0 if self.problem.sliders else float(self._by_zero()[0])
-            if force:  # how far it would touch is not known
-                errors[ZERO] = np.array([force, math.inf, self.zero, math.inf])
-            return MeasuredErrors(by_cause=errors, stiffness=0.0, zero=self.zero)
-        return self.of_force(self.answer_errors(), self.pressure_errors())
-
-    def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
-        """Return the errors of the force at the approach.
-
-        Args:
-            answer: What `answer_errors` returns.
-            pressure: What `pressure_errors` returns.
-
-        Note:
-            Collective.
-        """
-        parts = {cause: float(error[0]) for cause, error in answer.items()} | {
-            cause: float(self.response.force_changes(error).sum())
-            for cause, error in pressure.items()
-        }
-        step, force = self.step, self.state.force
-        # where elements and points change pressures, areas and stiffnesses change as these
-        others = {cause: _MOVED * self._going_with(parts[cause] / force) for cause in answer}
-        others[ZERO] = np.zeros(3)
-        if step.by_force:
-            parts[ZERO] = self.response.stiffness * self.zero
-        sums = self.response.sampling.patch_sums
-        for cause, error in pressure.items():
-            others[cause] = self._of_regions.get(cause, np.zeros(3))
-            if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
-                share = self._going_with(float(sums(error).sum()) / force)
-                others[cause] = np.maximum(others[cause], share)
-        if not step.by_force:  # besides, all go with the force
-            others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
-        sizes = [step.contact_area_fraction, 1.0, 1.0]
-        return MeasuredErrors(
-            by_cause={c: np.append(parts[c], others[c] * sizes) for c in self.causes},
-            stiffness=self.response.stiffness,
-            zero=self.zero,
-        )
-
-    @cached_property
-    def _gaps_by(self) -> float:
-        """Relative change of the force over that of the mean gap [1/mm]."""
-        known = self.step.interface_stiffness_N_per_mm or self.response.stiffness
-        return known / self.state.force
-
-    def _going_with(self, share: float) -> Array:
-        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,).
-
-        Near full contact the area hardly grows with the pressure, while gaps and stiffness where
-        the face bears little change more than all of it together.
-        """
-        errors = np.array([share, share / self._gaps_by, share])
-        if not math.isfinite(share) or not share:
-            return errors
-        known, sizes = self._read_off(0.0), np.ones(3)
-        moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
-        sizes[::2] = known[::2]
-        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
-        return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
-
-    def _read_off(self, share: float) -> Array:
-        """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
-
-        They are means over the face; collective.
-        """
-        sampling = self.response.sampling
-        pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
-        closure, found = (
-            self._closures_under(pressure, sampling.patch),
-            np.zeros((3, len(pressure))),
-        )
-        for region, law in enumerate(self.table.laws):
-            here = sampling.patch == region
-            point = law.at(closure[here], extend=True)
-            found[:, here] = point.contact_area_fraction, point.separation, point.stiffness
-        whole = sampling.patch_sums(np.ones_like(pressure)).sum()
-        return np.array([sampling.patch_sums(one).sum() for one in found]) / whole
-
-    @property
-    def causes(self) -> list[str]:
-        """The causes, in their order."""
-        return causes_of(self.samples)
-
-    @cached_property
-    def response(self) -> ApproachResponse:
-        """What the approach changes in the contact; collective."""
-        return self.problem.approach_response()
-
-    def answer_errors(self) -> dict[str, Array]:
-        """Return the errors of the answer by causes that are varied by solving again; collective.
-
-        The first of an answer is the force at the approach.
-        """
-        found = dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
-        return found | {ZERO: self._by_zero()}
-
-    def pressure_errors(self) -> dict[str, Array]:
-        """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
-        closure, patch = self.response.closure, self.response.sampling.patch
-        pressure = self.state.sample_pressure
-        if self.worn:  # the laws are those of the nearest depths: at equal pressures
-            closure = self._closures_under(pressure, patch)
-
-        def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
-            found = np.zeros_like(closure)
-            for region, law in enumerate(self.table.laws):
-                here = patch == region
-                found[here] = function(law, closure[here])
-            return found
-
-        factors = np.array([mean_error(region.surfaces) for region in self.samples])
-        sums = self.response.sampling.patch_sums
-        forces = sums(pressure)
-
-        def means(at: Array) -> Array:
-            weighted = sums(pressure * at)
-            return np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
-
-        (grid, slopes, widths), of_regions = self._of_samples(means(closure), forces, factors)
-        self._of_regions.update(of_regions)
-        # without load an unknown error is none
-        return {
-            "laws": by_region(interpolation_errors) * (pressure > 0.0),
-            "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
-            "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
-            "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
-            "edges": self._at_edges(widths),
-        }
-
-    def _closures_under(self, pressure: Array, patch: Indices) -> Array:
-        """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
-        closure = np.zeros_like(pressure)
-        for region, law in enumerate(self.table.laws):
-            closures, here = np.linspace(*law.range, PLACES), patch == region
-            closure[here] = np.interp(pressure[here], law.pressure(closures), closures)
-        return closure
-
-    def _at_edges(self, widths: Array) -> Array:
-        """Return what strips along the edges of the face carry, at the samples next to them [MPa].
-
-        Args:
-            widths: Widths of the strips by region, shape (regions,) [mm].
-        """
-        from patchlaw.macro.contact.other_elements import free_edges, nearest_samples
-
-        sampling, pressure = self.response.sampling, self.state.sample_pressure
-        first = self.face.sides[0]
-        edges = free_edges(first.body, first.facets)
-        beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)
-        errors = np.zeros_like(pressure)
-        for length, (samples, share) in zip(edges.length, beside, strict=True):
-            at = samples[pressure[samples] > 0.0]
-            carried = widths[sampling.patch[at]] * pressure[at] * length * share
-            errors[at] += carried / sampling.weight[at]
-        return errors
-
-    # --- elements
-
-    def discretisation(self) -> tuple[Array, Array]:
-        """Return the errors of what `answer_on` returns by elements and by quadrature.
-
-        The first are infinite where the elements are linear and quadratic ones too many.
-
-        Note:
-            Collective.
-        """
-        from patchlaw.macro.contact import other_elements as on
-
-        own, known = on.bodies_of(self.face), self.answer
-        points = known + self.by_points(on.face_on(self.face, lambda body: body, finer=True))
-        mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
-        if any(body.degree == 2 for body in own):
-            lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
-            mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
-        if any(body.degree == 1 for body in own):
-            error, quadratic = self._of_linear(own, points)
-            mesh, below = mesh + error, np.abs(quadratic - points)
-        if mesh[0] < _BY_CREASES * abs(known[0]):
-            mesh = np.maximum(mesh, below + self._of_creases(quadratic))
-        return mesh, np.abs(points - known)
-
-    def _of_linear(self, own: Sequence[Any], points: Array) -> tuple[Array | float, Array]:
-        """Return the errors of linear elements, infinite where they are not measured.
-
-        Args:
-            own: The bodies.
-            points: The answer on them with a finer quadrature.
-
-        Returns:
-            The errors, and the answer on the elements that told them.
-        """
-        from patchlaw.macro.contact import other_elements as on
-
-        other: Any
-        if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
-            other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
-            found = self.answer_on(other)
-            error = _OF_BEYOND * np.abs(found - points)
-        elif (other := on.face_on_half(self.face)) is not None:
-            found = self.answer_on(other, same=False)
-            error = OF_HALF * np.abs(found - self.answer)
-        else:
-            return math.inf, points
-        made = [body for body in on.bodies_of(other) if all(body is not one for one in own)]
-        del other
-        free_bodies(made)
-        return error, found
-
-    def _of_creases(self, quadratic: Array) -> Array | float:
-        """Return what quadratic elements err by on a coarse mesh, by cutting its cells into eight.
-
-        Args:
-            quadratic: The answer on quadratic elements.
-        """
-        from patchlaw.macro.contact import other_elements as on
-
-        unknowns = sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
-        cut = on.refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
-        if cut is None:
-            return 0.0
-        made, found = on.bodies_of(cut), self.answer_on(cut, same=False)
-        del cut
-        free_bodies(made)
-        return OF_REFINED * np.abs(found - quadratic)
-
-    def _by_zero(self) -> Array:
-        """Return what the answer errs by as a held plane may be nearer by the error of the zero."""
-        if self.step.by_force or not self.zero:
-            return np.zeros_like(self.answer)
-        return np.abs(self.answer_on(self.face, nearer=self.zero) - self.answer)
-
-    def by_points(self, finer: Any) -> Array:
-        """Return what more quadrature points change in the answer, to first order.
-
-        Args:
-            finer: The face with them.
-        """
-        return self._borne(self.problem_with(finer, self.table)) - self._borne(self.problem)
-
-    def _borne(self, problem: LawContactProblem) -> Array:
-        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
-        return problem.forces_at(self.state, self.control.body_state, self.response)
-
-    @property
-    def answer(self) -> Array:
-        """What discretisation may be off by: the force, shape (1,) [N]."""
-        return np.array([self.state.force])
-
-    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
-        """Return the answer on another face, under the same plane.
-
-        Args:
-            face: The face.
-            same: Whether its meshes are the same. On more unknowns the answer is then that to first
-                order.
-            nearer: How much nearer the plane is [mm].
-        """
-        from patchlaw.macro.contact import other_elements as on
-
-        problem = self.problem_with(face, self.table)
-        if same:
-            on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
-            if face.body.dofs > self.face.body.dofs:
-                step = self.control, self.problem, self.response
-                return np.array([problem.first_order_force(*step)])
-        else:
-            problem.start_from(self.state.patch_pressure)
-        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
-
-    # --- samples
-
-    def _of_samples(
+    def of_cells(
         self, closures: Array, forces: Array, factors: Array
     ) -> tuple[Array, dict[str, Array]]:
         """Return what samples on their cells err by.
@@ -512,14 +168,21 @@ class LawErrorProbe:
         """
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
-        tell = partial(self._told_by, closures=closures)
-        for number, own, areas in self.of_regions("check of samples", tell, list(forces > 0.0)):
+        laws, known = self.table.laws, self.cells.told
+        places = [(law, _rounded(law, at)) for law, at in zip(laws, closures, strict=True)]
+        unknown = [f > 0.0 and at not in known for f, at in zip(forces, places, strict=True)]
+        tell = partial(self._told_by, closures=[closure for _, closure in places])
+        for number, own, areas in self.of_regions("check of samples", tell, unknown):
+            known[places[number]] = own, areas
+        for number in np.flatnonzero(forces > 0.0):
+            own, areas = known[places[number]]
             sums[:, number] = own[:, :4].sum(axis=0)
-            weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
-            of_regions["grid"] += weights @ own[:, 4:7]
-            of_regions["slopes"] += weights @ own[:, 7:10]
-            scatter = _scatter(areas, own[:, 10:])
-            of_regions["samples"] += factors[number] * scatter * forces[number] / whole
+            gap = _gap(laws[number], closures[number])
+            part = forces[number] / whole * np.array([1.0, gap, 1.0])
+            weights = own[:, 3] / (own[:, 3].sum() or 1.0)
+            of_regions["grid"] += part * (weights @ own[:, 4:7])
+            of_regions["slopes"] += part * (weights @ own[:, 7:10])
+            of_regions["samples"] += part * factors[number] * _scatter(areas, own[:, 10:])
         means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
         return np.array([*means, sums[2]]), of_regions
 
@@ -549,15 +212,16 @@ class LawErrorProbe:
             areas = [sample.area for sample in samples[number].surfaces]
             yield number, np.array(own), np.array(areas)
 
-    def _told_by(self, number: int, sample: Surface, closures: Array) -> Array:
+    def _told_by(self, number: int, sample: Surface, closures: Sequence[float]) -> Array:
         """Return what a sample on its cells tells, shape (_KNOWN,).
 
         Args:
             number: Number of its region.
             sample: The sample.
-            closures: Mean closures of the regions, shape (regions,) [mm].
+            closures: Closures of the regions, shape (regions,) [mm].
         """
         region, law, closure = self.samples[number], self.table.laws[number], closures[number]
+        sizes = np.array([1.0, _gap(law, closure), 1.0])
         probe, known = self.cells.probe_of(region, sample), np.zeros(_KNOWN)
         reference = probe.model.reference_height - sample.mean_height
         approach = reference - separation_of(law, float(closure), reference)
@@ -567,7 +231,7 @@ class LawErrorProbe:
             known[2] = self.cells.edge_width_of(region, sample, pressure)
         if len(region.surfaces) > 1:
             mean = Control(force=pressure * sample.area)
-            known[10:] = _read(model, model.press(mean, start=state.guess))
+            known[10:] = _read(model, model.press(mean, start=state.guess)) / sizes
         if not state.force:  # the closure is that of others of the samples
             return known
         area, _, stiffness = _read(model, state)
@@ -583,8 +247,8 @@ class LawErrorProbe:
         ).by_cause
         known[3] = state.force
         for row, cause in enumerate(("grid", "slopes")):
-            known[row], area_error, gap_error, stiffer = errors[cause][:4]
-            known[4 + 3 * row : 7 + 3 * row] = area_error / area, gap_error, stiffer
+            known[row], *others = errors[cause][:4]
+            known[4 + 3 * row : 7 + 3 * row] = others / sizes / [area, 1.0, 1.0]
         return known
 
     def _by_cells(
@@ -613,16 +277,19 @@ class LawErrorProbe:
         return np.array([nearer * float(law.stiffness(closure)) * surface.area, area, gap])
 
 
-def nearer_by(control: Control, distance: float) -> Control:
-    """Return a control whose plane is nearer, where its approach is held.
+def _rounded(law: PatchLaw, closure: float) -> float:
+    """Return the closure of a law at the nearest power of `_ROUNDED` to its pressure [mm]."""
+    if not (pressure := float(law.pressure(closure))):
+        return closure
+    power = _ROUNDED ** round(math.log(pressure, _ROUNDED))
+    closures = np.linspace(*law.range, PLACES)
+    return float(np.interp(power, law.pressure(closures), closures))
 
-    Args:
-        control: The control.
-        distance: How much nearer it is [mm].
-    """
-    if control.approach is None:
-        return control
-    return replace(control, approach=control.approach + distance)
+
+def _gap(law: PatchLaw, closure: float) -> float:
+    """Return the mean gap of a law at a closure, or the least one that samples are judged at."""
+    point = law.at(closure, extend=True)
+    return max(float(point.separation), _LEAST_SEPARATION * law.initial_separation)
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
@@ -634,7 +301,7 @@ def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, flo
 def _scatter(areas: Array, read: Array) -> Array:
     """Return standard deviations of area, mean gap and stiffness among samples, shape (3,).
 
-    Those of area and stiffness are relative; 0 of a single sample.
+    Those of area and stiffness are relative, those of the gap as it is; 0 of a single sample.
 
     Args:
         areas: Areas of the samples, which they count by, shape (n,) [mm²].
@@ -646,31 +313,6 @@ def _scatter(areas: Array, read: Array) -> Array:
     means = shares @ read
     apart = np.sqrt(shares @ (read - means) ** 2 / (1.0 - shares @ shares))
     return stated(apart / [means[0], 1.0, means[2]])
-
-
-def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
-    """Return the causes of errors that are measured.
-
-    Args:
-        samples: Those of every region; single ones tell no error of their mean.
-    """
-    several = any(len(region.surfaces) > 1 for region in samples)
-    return [cause for cause in CAUSES if several or cause != "samples"]
-
-
-def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
-    """Yield the memory that measuring the errors of a load step takes beside that of the run.
-
-    Args:
-        bodies: What is known of the bodies, by their section of the scene.
-    """
-    raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
-    if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
-        return
-    for key, body in raised.items():
-        asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
-        purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
-        yield replace(asked, key="output.check", purpose=purpose, shared=_TOLD * asked.shared)
 
 
 def separation_of(law: PatchLaw, closure: float, reference: float) -> float:
@@ -714,30 +356,3 @@ def mean_error(samples: Sequence[Surface], pooled: int = 1) -> float:
     if count <= 1.0:
         return 0.0
     return float(scipy.special.stdtrit(pooled * (count - 1.0), _SHARE)) / math.sqrt(count)
-
-
-def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:
-    """Yield what the measured errors of a load step leave out.
-
-    Args:
-        samples: Those of every region.
-        step: The load step.
-    """
-    alone = [region.name for region in samples if len(region.surfaces) == 1]
-    if alone:
-        yield (
-            f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
-            "others would change is not known (law.seeds gives a spectrum several)"
-        )
-    if step.shear_errors and step.step > MOST_REMEMBERED:
-        yield Caution(
-            f"the error of the shear by its load steps is that of the last {MOST_REMEMBERED} of "
-            f"{step.step}: earlier ones are not remembered, and what they erred by is not known "
-            "where contacts have stuck since"
-        )
-    if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
-        yield Caution(
-            "the error by mesh was not measured: quadratic elements, which would tell that of "
-            f"linear ones, have more than {MOST_CHECKED_UNKNOWNS} unknowns on this mesh; take a "
-            "coarser mesh with quadratic elements, whose error linear ones tell"
-        )

@@ -61,6 +61,8 @@ BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
 seventh and a half of the error, which was 0.36 and 1.05 of that of the normal force."""
+_TOLERANCE = 1e-5
+"""Residual of tractions, and of what they and pressures see of each other, on paths gone again."""
 FEWEST_CELLS = 16
 """Cells along a side below which half as many show no error."""
 _NORMAL = ("body", "slopes", ZERO)
@@ -186,9 +188,9 @@ def shear_errors(
     half, quarter = path.on(2), path.on(4)
     varied = list(_varied(half[1], half[0].surface.grid))
     # behind laws pressures and tractions are solved in turn
-    times = [2] * len(steps) if behind is not None else _times_of(steps)
-    on = path.on(1) if by_steps and behind is None and max(grid) <= _OWN_CELLS else half
-    path.expect([half, quarter, *[half] * len(varied)], on[0], times if by_steps else [])
+    times = [] if not by_steps else [2] * len(steps) if behind is not None else _times_of(steps)
+    on = path.on(1) if times and behind is None and max(grid) <= _OWN_CELLS else half
+    path.expect([half, quarter, *[half] * len(varied)], on[0], times)
     again = path.answer("half", *half)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
     by_cells = grid_error(_apart(again, own), _apart(path.answer("quarter", *quarter), again))
@@ -196,16 +198,8 @@ def shear_errors(
     for number, (cause, factor, other) in enumerate(varied):
         change = _apart(path.answer(f"{cause} {number}", half[0], other), again)
         parts[cause] = parts.get(cause, 0.0) + factor * change
-    if by_steps:
-        errors = error_by_steps(
-            lambda times: path.answer(f"in {times[0]}", *on, times),
-            again if on is half else own,
-            times,
-            _apart,
-        )
-        # of the area that slips, no less than two cells, which slip or stick as a whole
-        errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
-        parts["steps"] = errors
+    if times:
+        parts["steps"] = path.by_steps(on, again if on is half else own, times)
     if not step.by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
@@ -324,6 +318,15 @@ class _Path(NamedTuple):
         load = state.approach if end.by_force else state.force
         normal = load, area, state.mean_separation, *worn_depths(state)
         return np.append(_answers(shear, area, by_shift=end.by_shift), normal)
+
+    def by_steps(self, on: _Contact, whole: Array, times: Sequence[int]) -> Array:
+        """Return the errors of the answer by the load steps; see `error_by_steps`."""
+        errors = error_by_steps(
+            lambda times: self.answer(f"in {times[0]}", *on, times), whole, times, _apart
+        )
+        # of the area that slips, no less than two cells, which slip or stick as a whole
+        errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
+        return errors
 
 
 def _is_straight(steps: Sequence[LoadStep]) -> bool:
@@ -454,7 +457,8 @@ def resampled(
 ) -> tuple[HalfSpaceModel, FrictionModel]:
     """Return the normal contact and its friction on other cells."""
     normal = probe.on_body(probe.model.resampled(grid), probe.order)
-    return normal, replace(friction, spacing=normal.surface.spacing)
+    tolerance = max(_TOLERANCE, friction.tolerance)
+    return normal, replace(friction, spacing=normal.surface.spacing, tolerance=tolerance)
 
 
 def grid_error(half: Array, quarter: Array) -> Array:

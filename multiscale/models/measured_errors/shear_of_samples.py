@@ -39,12 +39,8 @@ from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.models.measured_errors.samples import (
-    PLACES,
-    LawErrorProbe,
-    nearer_by,
-    separation_of,
-)
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe, nearer_by
+from patchlaw.multiscale.models.measured_errors.samples import PLACES, separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -60,6 +56,7 @@ from patchlaw.support import Array, NotConverged
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
+    from patchlaw.macro.contact.law_problem import LawContactProblem
 
 
 _PARTS = 16
@@ -182,36 +179,30 @@ class LawShearProbe(LawErrorProbe):
         """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
         return self._answer_of(self.state.approach, self.state.force, self._shear)
 
-    def by_points(self, finer: Any) -> Array:
+    def by_points(self) -> Array:
         """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
 
         The shear errs as that by springs that have come to where they are in one step, which no
         points need remember.
         """
-        whole, other = (
-            self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
-        )
+        with self._other("the same", lambda face: face) as same:
+            whole, other = self._borne(same), self._borne_on_finer()
         normal, *shear = np.abs(other - whole)
         borne = max(math.hypot(*whole[1:]), _NO_SHEAR * whole[0]) or 1.0
         share = min(math.hypot(*shear) / borne, 1.0)
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
-    def answer_on(self, face: Any, *, same: bool = True, nearer: float = 0.0) -> Array:
+    def answer_on(
+        self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
+    ) -> Array:
         """Return the answer on another face, where the load step alone is solved again."""
-        from patchlaw.macro.contact import other_elements as on
-
-        problem, (control,) = self.problem_with(face, self.table), parted_path([self.step])
+        (control,) = parted_path([self.step])
         assert problem.sliders is not None
         problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
-        if same:
-            state = self.control.body_state
-            on.start_from_elements(problem, face, self.state, self.face, state)
-            if face.body.dofs > self.face.body.dofs:
-                step = control, self.problem, self.before
-                return self._answer_of(*problem.first_order_step(*step))
-        else:
-            problem.start_from(self.state.patch_pressure)
+        if self.begins_on(problem, same=same):
+            step = control, self.problem, self.before
+            return self._answer_of(*problem.first_order_step(*step))
         found = problem.solve(nearer_by(control, nearer))
         return self._answer_of(found.approach, found.force, found.shear)
 

@@ -80,7 +80,7 @@ def test_other_elements_give_what_bodies_of_them_give(kind):
     assert finer.body.linear is linear.body
     assert finer.quadrature_degree == 2 * linear.quadrature_degree + 2
     again = problem(finer)
-    start_from_elements(again, finer, known, linear)
+    start_from_elements(again, known, linear)
     assert len(again.basis) == 1
     found = again.solve(control).force
     quadratic = face_of(kind, 2)
@@ -90,7 +90,7 @@ def test_other_elements_give_what_bodies_of_them_give(kind):
     assert found == pytest.approx(force_at(points, 9.3e-3, (1.1e-3, 0.0)), rel=3e-4)
     lowered = face_on(quadratic, lambda body: body.linear)
     below = problem(lowered)
-    start_from_elements(below, lowered, problem(quadratic).solve(control), quadratic)
+    start_from_elements(below, problem(quadratic).solve(control), quadratic)
     assert lowered.quadrature_degree == quadratic.quadrature_degree
     assert below.solve(control).force == pytest.approx(known.force, rel=2e-3)
 
@@ -100,7 +100,7 @@ def test_two_bodies_change_their_elements_together():
     known = problem(both).solve(control)
     finer = face_on(both, lambda body: body.as_quadratic())
     again = problem(finer)
-    start_from_elements(again, finer, known, both)
+    start_from_elements(again, known, both)
     found = again.solve(control).force
     assert finer.body.dofs == sum(quadratic_dofs(each.body) for each in (both.first, both.second))
     assert 0.7 * known.force < found < 0.999 * known.force  # linear elements are too stiff
@@ -115,7 +115,7 @@ def test_solutions_are_carried_to_other_elements_with_their_preload():
     known = problem(linear).solve(control)
     finer = face_on(linear, lambda body: body.as_quadratic())
     again = problem(finer)
-    start_from_elements(again, finer, known, linear, control.body_state)
+    start_from_elements(again, known, linear, control.body_state)
     expected = problem(face_on(quadratic, lambda body: body)).solve(control).force
     assert abs(expected / known.force - 1.0) > 1e-3
     coarse = face_on(finer, lambda body: linear.body)  # has the quadrature of the linear face
@@ -134,7 +134,7 @@ def test_bolts_turn_the_plane_to_first_order_too():
     known = lower.solve(Control(force=40.0, tilt=None))
     finer = face_on(linear, lambda body: body.as_quadratic())
     again, control = problem(finer), lower.same_approach()
-    start_from_elements(again, finer, known, linear)
+    start_from_elements(again, known, linear)
     found = again.first_order_force(control, lower, lower.approach_response())
     whole = again.solve(control).force
     assert abs(found - whole) < 0.2 * abs(whole - known.force)

@@ -6,6 +6,7 @@ from scipy.integrate import dblquad
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.friction.tangential_grid import TangentialGrid, cerruti_kernels
+from patchlaw.support import parallel
 
 SPACING = 0.13, 0.21
 RATIO = 0.37
@@ -85,3 +86,15 @@ def test_the_inverse_undoes_the_compliance_of_a_period():
     tractions -= tractions.mean(axis=(1, 2), keepdims=True)
     moved = half_space.displacement(tractions).astype(np.float32)
     assert half_space.inverse(moved) == pytest.approx(tractions, abs=1e-5)
+
+
+def test_small_grids_start_no_threads(monkeypatch):
+    """Starting them takes eight times as long as the product."""
+
+    def refuse(count):
+        raise AssertionError("threads were started")
+
+    monkeypatch.setattr(parallel, "_pool", refuse)
+    grid = TangentialGrid((32, 32), (0.1, 0.1), poisson_ratio=0.3, periodic=True)
+    with parallel.allocated(2):
+        assert grid.displacement(np.ones((2, 32, 32))).shape == (2, 32, 32)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,14 +12,14 @@ from scipy.stats import norm
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.models.measured_errors import samples as law_errors
+from patchlaw.multiscale.models.measured_errors import faces as law_errors
 from patchlaw.multiscale.models.measured_errors.errors import response_of
-from patchlaw.multiscale.models.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.faces import (
+    LawErrorProbe,
     check_requests,
-    interpolation_errors,
-    mean_error,
     omission_notes,
 )
+from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
 from patchlaw.multiscale.readable import quantity
 from patchlaw.support import InputError
 
@@ -202,6 +203,50 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     closure = law.rows.closure[[1, -1]]
     found = interpolation_errors(known, closure)
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
+
+
+class NearlyClosed:
+    """A law whose gap closes as the inverse of the pressure: p = 1 / gap − 1 / 1.2 mm."""
+
+    range = 0.0, 1.2 - 1.0 / 25.0
+
+    def at(self, _, closure, extend):
+        gap = 1.2 - np.asarray(closure)
+        pressure, area = 1.0 / gap - 1.0 / 1.2, np.full_like(gap, 0.999)
+        return SimpleNamespace(
+            pressure=pressure, separation=gap, stiffness=gap**-2.0, contact_area_fraction=area
+        )
+
+    def pressure(self, closure):
+        return self.at(0, closure, True).pressure
+
+
+def test_gap_and_stiffness_near_full_contact_err_as_the_law_says_at_every_point():
+    """Half of the face is nearly closed, and stiff, the other bears little and has the gap."""
+    pressure, weight, share = np.array([20.0, 1.0]), np.array([0.3, 0.3]), 0.1
+    sampling = SimpleNamespace(
+        patch=np.zeros(2, np.intp), patch_sums=lambda values: np.array([weight @ values])
+    )
+    gaps, force = (lambda p: 1.0 / (p + 1.0 / 1.2)), float(weight @ pressure)
+    stiffness = float(weight @ gaps(pressure) ** -2.0)
+    probe = LawErrorProbe(
+        **dict.fromkeys(("problem", "face", "problem_with", "cells")),
+        state=SimpleNamespace(sample_pressure=pressure, force=force),
+        table=SimpleNamespace(laws=[law := NearlyClosed()], together=lambda: law),
+        samples=(),
+        new_laws=(),
+        step=SimpleNamespace(interface_stiffness_N_per_mm=stiffness),
+    )
+    probe.__dict__["response"] = SimpleNamespace(sampling=sampling)
+    known, *moved = (gaps(pressure * (1.0 + by)) for by in (0.0, share, -share))
+    gap = max(abs((one - known).mean()) for one in moved)
+    stiffer = max(abs((one**-2.0).mean() / (known**-2.0).mean() - 1.0) for one in moved)
+    area_error, *others = probe._going_with(share)
+    assert area_error == pytest.approx(0.0, abs=1e-12)
+    # the law is read off between 401 places
+    assert others == pytest.approx([gap, stiffer], rel=0.02)
+    assert gap > 2.5 * share * force / stiffness  # as if the whole face closed alike
+    assert stiffer > 1.8 * share
 
 
 @pytest.mark.long

@@ -1,5 +1,6 @@
 """Errors of shear under laws of samples: paths that go on, and what load steps before have lost."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,15 +53,14 @@ def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, 
 @pytest.mark.parametrize(("shear", "part"), [(0.8, 0.05), (1e-17, 0.04)])
 def test_points_tell_no_part_of_a_shear_that_is_none(shear, part):
     """A part of rounding would state metres, as load steps before the shear did."""
-    borne = {"face": np.array([4.0, shear, 0.0]), "finer": np.array([4.1, 1.05 * shear, 0.0])}
-    borne["finer"][1] += 1.6e-7 if shear < 1e-6 else 0.0
+    finer = np.array([4.1, 1.05 * shear, 0.0])
+    finer[1] += 1.6e-7 if shear < 1e-6 else 0.0
     probe = SimpleNamespace(
-        face="face",
-        table=None,
-        problem_with=lambda face, table: face,
-        _borne=borne.get,
+        _other=lambda name, make: nullcontext(name),
+        _borne=lambda name: np.array([4.0, shear, 0.0]),
+        _borne_on_finer=lambda: finer,
         step=SimpleNamespace(by_force=False),
         answer=np.array([4.0, 3e-4, 4e-4, 7e-6]),
     )
-    found = LawShearProbe.by_points(probe, "finer")
+    found = LawShearProbe.by_points(probe)
     assert found == pytest.approx(np.array([0.1, *(part * probe.answer[1:])]))

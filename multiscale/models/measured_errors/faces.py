@@ -1,0 +1,488 @@
+"""Errors of load steps on faces under laws of samples, by cause, measured in the run.
+
+Each cause is varied while all others stay, under the plane of the load step: elements of the body
+to first order from the known solution where they are linear, by another one where they are
+quadratic; the laws by what they err at the pressures of the step, see `samples` beside this module,
+and the quadrature by their pressures at more points. One linear solution tells what these change,
+to first order: the response of the contact to the approach, which tells the error of the approach,
+too.
+
+Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
+(docs/accuracy.md).
+
+Theory: docs/theory.md, section 13.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from patchlaw.geometry import Control
+from patchlaw.geometry.sliders import MOST_REMEMBERED
+from patchlaw.multiscale.bodies.bodies import free_bodies
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors
+from patchlaw.multiscale.models.measured_errors.samples import (
+    PLACES,
+    SampleProbe,
+    interpolation_errors,
+    mean_error,
+)
+from patchlaw.multiscale.readable import Caution
+from patchlaw.multiscale.scene.memory import body_request
+from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.scene.surfaces import RegionSamples
+from patchlaw.support import Array, Indices
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro.contact.law_problem import ApproachResponse
+
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
+"""The causes, in their order."""
+MOST_CHECKED_UNKNOWNS = 400_000
+"""Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
+is measured for a block alone, by half of its cells along every side; that of modes is not told."""
+OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
+_OF_BEYOND = 1.5
+"""Errors of linear and of quadratic elements over the change of the force from one to the other, of
+linear ones over the change from half as many cells along every side, and of quadratic ones over the
+change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random. The last is of linear
+ones over what displacements change that only quadratic ones have, 0.7 to 1 of the whole."""
+_BY_CREASES, _MOST_KEPT_UNKNOWNS = 3e-3, 20_000
+"""Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
+have so many unknowns at most; other elements with so many are kept for later load steps. Creases
+between the facets of a faceted side disturb a uniform stress by 1e-4 to 1e-3 in places that no
+degree of elements resolves on the same mesh."""
+_TOLD = 0.57
+"""Memory of the products that tell the error of linear elements over that of a solve: 1230 of 2150
+B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
+_MOVED = 2.0
+"""Errors of area, gap and stiffness under the force over that of the force at the approach,
+relative, where elements and points move pressures about: up to 1.6 on a tilted slab of four
+elements, and up to 1.7 on four bodies drawn at random of cells of 1.5 times their usual length,
+where they were 0.9 to 2.5 at the approach."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawErrorProbe(SampleProbe):
+    """Measures the errors of the latest load step on a face with laws of samples.
+
+    Args, besides those of `SampleProbe`:
+        problem: The body with the laws on its contact face, at the load step.
+        face: The contact face.
+        state: The contact there.
+        problem_with: Returns the problem on a face of the same bodies, with laws.
+        step: The load step.
+        worn: Whether laws and samples are those of depths near to what has worn off.
+        new_laws: The laws of the samples before they wore; of new samples those of `table`.
+        zero: Error of the height that approaches count from [mm].
+        elsewhere: By name other faces of small bodies, each with laws and the problem there.
+    """
+
+    problem: LawContactProblem
+    face: LoadedFace | FacePair
+    state: FaceEquilibrium
+    problem_with: Callable[[Any, LawTable], LawContactProblem]
+    step: LoadStep
+    worn: bool = False
+    new_laws: Sequence[PatchLaw]
+    zero: float = 0.0
+    elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
+    _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def control(self) -> Control:
+        """What prescribes the plane of the load step, by its approach."""
+        return self.problem.same_approach()
+
+    def measure(self) -> MeasuredErrors:
+        """Measure the errors of the force at the approach.
+
+        A plane that is free to turn does so in every comparison.
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+
+        Note:
+            Collective.
+        """
+        if not self.state.force:
+            errors = dict.fromkeys(self.causes, np.zeros(4))
+            force = 0.0 if self.problem.sliders else float(self._by_zero()[0])
+            if force:  # how far it would touch is not known
+                errors[ZERO] = np.array([force, math.inf, self.zero, math.inf])
+            return MeasuredErrors(by_cause=errors, stiffness=0.0, zero=self.zero)
+        return self.of_force(self.answer_errors(), self.pressure_errors())
+
+    def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
+        """Return the errors of the force at the approach.
+
+        Args:
+            answer: What `answer_errors` returns.
+            pressure: What `pressure_errors` returns.
+
+        Note:
+            Collective.
+        """
+        parts = {cause: float(error[0]) for cause, error in answer.items()} | {
+            cause: float(self.response.force_changes(error).sum())
+            for cause, error in pressure.items()
+        }
+        step, force = self.step, self.state.force
+        # where elements and points change pressures, areas and stiffnesses change as these
+        others = {cause: _MOVED * self._going_with(parts[cause] / force) for cause in answer}
+        others[ZERO] = np.zeros(3)
+        if step.by_force:
+            parts[ZERO] = self.response.stiffness * self.zero
+        sums = self.response.sampling.patch_sums
+        for cause, error in pressure.items():
+            others[cause] = self._of_regions.get(cause, np.zeros(3))
+            if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
+                share = self._going_with(float(sums(error).sum()) / force)
+                others[cause] = np.maximum(others[cause], share)
+        if not step.by_force:  # besides, all go with the force
+            others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
+        sizes = [step.contact_area_fraction, 1.0, 1.0]
+        return MeasuredErrors(
+            by_cause={c: np.append(parts[c], others[c] * sizes) for c in self.causes},
+            stiffness=self.response.stiffness,
+            zero=self.zero,
+        )
+
+    @cached_property
+    def _gaps_by(self) -> float:
+        """Relative change of the force over that of the mean gap [1/mm]."""
+        known = self.step.interface_stiffness_N_per_mm or self.response.stiffness
+        return known / self.state.force
+
+    def _going_with(self, share: float) -> Array:
+        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,).
+
+        Near full contact the area hardly grows with the pressure, while gaps and stiffness where
+        the face bears little change more than all of it together.
+        """
+        errors = np.array([share, share / self._gaps_by, share])
+        if not math.isfinite(share) or not share:
+            return errors
+        known, sizes = self._as_read, np.ones(3)
+        moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
+        sizes[::2] = known[::2]
+        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
+        return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
+
+    @cached_property
+    def _as_read(self) -> Array:
+        return self._read_off(0.0)
+
+    def _read_off(self, share: float) -> Array:
+        """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
+
+        They are means over the face; collective.
+        """
+        sampling = self.response.sampling
+        pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
+        closure = self._closures_under(pressure, sampling.patch)
+        point = self.table.together().at(sampling.patch, closure, extend=True)
+        found = point.contact_area_fraction, point.separation, point.stiffness
+        whole = sampling.patch_sums(np.ones_like(pressure)).sum()
+        return np.array([sampling.patch_sums(one).sum() for one in found]) / whole
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return causes_of(self.samples)
+
+    @cached_property
+    def response(self) -> ApproachResponse:
+        """What the approach changes in the contact; collective."""
+        return self.problem.approach_response()
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by solving again; collective.
+
+        The first of an answer is the force at the approach.
+        """
+        found = dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+        return found | {ZERO: self._by_zero()}
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
+        closure, patch = self.response.closure, self.response.sampling.patch
+        pressure = self.state.sample_pressure
+        if self.worn:  # the laws are those of the nearest depths: at equal pressures
+            closure = self._closures_under(pressure, patch)
+
+        factors = np.array([mean_error(region.surfaces) for region in self.samples])
+        sums = self.response.sampling.patch_sums
+        forces = sums(pressure)
+
+        def means(at: Array) -> Array:
+            weighted = sums(pressure * at)
+            return np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
+
+        (grid, slopes, widths), of_regions = self.of_cells(means(closure), forces, factors)
+        self._of_regions.update(of_regions)
+        # without load an unknown error is none
+        return {
+            "laws": self._by_law(interpolation_errors, closure, patch) * (pressure > 0.0),
+            "samples": factors[patch] * self._by_law(PatchLaw.pressure_scatter, closure, patch),
+            "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
+            "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
+            "edges": self._at_edges(widths),
+        }
+
+    def _closures_under(self, pressure: Array, patch: Indices) -> Array:
+        """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
+
+        def closures(law: PatchLaw, pressure: Array) -> Array:
+            places = np.linspace(*law.range, PLACES)
+            return np.interp(pressure, law.pressure(places), places)
+
+        return self._by_law(closures, pressure, patch)
+
+    def _by_law(
+        self, function: Callable[[PatchLaw, Array], Array], values: Array, patch: Indices
+    ) -> Array:
+        """Return a function of the law at every sample, and of values there, shape (n,)."""
+        found = np.zeros_like(values)
+        for region, law in enumerate(self.table.laws):
+            here = patch == region
+            found[here] = function(law, values[here])
+        return found
+
+    def _at_edges(self, widths: Array) -> Array:
+        """Return what strips along the edges of the face carry, at the samples next to them [MPa].
+
+        Args:
+            widths: Widths of the strips by region, shape (regions,) [mm].
+        """
+        from patchlaw.macro.contact.other_elements import free_edges, nearest_samples
+
+        sampling, pressure = self.response.sampling, self.state.sample_pressure
+        first = self.face.sides[0]
+        edges = free_edges(first.body, first.facets)
+        beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)
+        errors = np.zeros_like(pressure)
+        for length, (samples, share) in zip(edges.length, beside, strict=True):
+            at = samples[pressure[samples] > 0.0]
+            carried = widths[sampling.patch[at]] * pressure[at] * length * share
+            errors[at] += carried / sampling.weight[at]
+        return errors
+
+    # --- elements
+
+    def discretisation(self) -> tuple[Array, Array]:
+        """Return the errors of what `answer_on` returns by elements and by quadrature.
+
+        The first are infinite where the elements are linear and quadratic ones too many.
+
+        Note:
+            Collective.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        own, known = on.bodies_of(self.face), self.answer
+        points = known + self.by_points()
+        mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
+        if any(body.degree == 2 for body in own):
+            linear = partial(on.face_on, choose=lambda b: b.linear if b.degree == 2 else b)
+            mesh += OF_QUADRATIC * np.abs(self._answer_of_kind("linear", linear) - known)
+        if any(body.degree == 1 for body in own):
+            error, quadratic = self._of_linear(points)
+            mesh, below = mesh + error, np.abs(quadratic - points)
+        if mesh[0] < _BY_CREASES * abs(known[0]) and 8 * self._most <= _MOST_KEPT_UNKNOWNS:
+            # creases, by quadratic elements on cells cut into eight
+            if (found := self._answer_of_kind("cut", on.refined_face, same=False)) is not None:
+                mesh = np.maximum(mesh, below + OF_REFINED * np.abs(found - quadratic))
+        return mesh, np.abs(points - known)
+
+    @cached_property
+    def _most(self) -> int:
+        """Unknowns of the bodies with quadratic elements; collective."""
+        from patchlaw.macro.contact import other_elements as on
+
+        return sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
+
+    def _of_linear(self, points: Array) -> tuple[Array | float, Array]:
+        """Return the errors of linear elements, infinite where they are not measured.
+
+        Args:
+            points: The answer on them with a finer quadrature.
+
+        Returns:
+            The errors, and the answer on the elements that told them.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        def raised(face: Any) -> Any:
+            return on.face_on(face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
+
+        if self._most <= MOST_CHECKED_UNKNOWNS:
+            found = self._answer_of_kind("quadratic", raised)
+            return _OF_BEYOND * np.abs(found - points), found
+        found = self._answer_of_kind("half", on.face_on_half, same=False)
+        if found is None:
+            return math.inf, points
+        return OF_HALF * np.abs(found - self.answer), found
+
+    def _answer_of_kind(self, kind: str, make: Callable[[Any], Any], same: bool = True) -> Any:
+        """Return the answer on another face, None where there is none; see `answer_on`."""
+        with self._other(kind, make) as problem:
+            return None if problem is None else self.answer_on(problem, same=same)
+
+    @contextmanager
+    def _other(self, kind: str, make: Callable[[Any], Any]) -> Iterator[Any]:
+        """Lend the problem on another face; faces of small bodies are kept to the next load step.
+
+        Args:
+            kind: Name of the face.
+            make: Makes it from that of the run; None where there is none.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        kept = self.elsewhere
+        face, table, problem = kept.pop(kind, None) or (make(self.face), None, None)
+        if face is not None and (problem is None or table is not self.table):
+            problem = self.problem_with(face, self.table)
+        yield problem
+        own = on.bodies_of(self.face)
+        if face is None or self._most <= _MOST_KEPT_UNKNOWNS:
+            kept[kind] = face, self.table, problem
+            return
+        made = [body for body in on.bodies_of(face) if all(body is not one for one in own)]
+        del face, problem
+        free_bodies(made)
+
+    def _by_zero(self) -> Array:
+        """Return what the answer errs by as a held plane may be nearer by the error of the zero."""
+        if self.step.by_force or not self.zero:
+            return np.zeros_like(self.answer)
+        with self._other("nearer", lambda face: face) as problem:
+            return np.abs(self.answer_on(problem, nearer=self.zero) - self.answer)
+
+    def by_points(self) -> Array:
+        """Return what more quadrature points change in the answer, to first order."""
+        return self._borne_on_finer() - self._borne(self.problem)
+
+    def _borne_on_finer(self) -> Array:
+        from patchlaw.macro.contact import other_elements as on
+
+        with self._other("finer", lambda f: on.face_on(f, lambda body: body, finer=True)) as finer:
+            return self._borne(finer)
+
+    def _borne(self, problem: LawContactProblem) -> Array:
+        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
+        return problem.forces_at(self.state, self.control.body_state, self.response)
+
+    @property
+    def answer(self) -> Array:
+        """What discretisation may be off by: the force, shape (1,) [N]."""
+        return np.array([self.state.force])
+
+    def answer_on(
+        self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
+    ) -> Array:
+        """Return the answer on another face, under the same plane.
+
+        Args:
+            problem: The problem there.
+            same: Whether its meshes are the same. On more unknowns the answer is then that to first
+                order.
+            nearer: How much nearer the plane is [mm].
+        """
+        if self.begins_on(problem, same=same):
+            step = self.control, self.problem, self.response
+            return np.array([problem.first_order_force(*step)])
+        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
+
+    def begins_on(self, problem: LawContactProblem, *, same: bool) -> bool:
+        """Let a problem begin where the load step is; tell whether its end follows to first order.
+
+        Args:
+            problem: The problem.
+            same: Whether its meshes are the same.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        if not same:
+            problem.start_from(self.state.patch_pressure)
+            return False
+        state = self.control.body_state
+        on.start_from_elements(problem, self.state, self.face, state)
+        return bool(problem.face.body.dofs > self.face.body.dofs)
+
+
+def nearer_by(control: Control, distance: float) -> Control:
+    """Return a control whose plane is nearer, where its approach is held.
+
+    Args:
+        control: The control.
+        distance: How much nearer it is [mm].
+    """
+    if control.approach is None:
+        return control
+    return replace(control, approach=control.approach + distance)
+
+
+def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
+    """Return the causes of errors that are measured.
+
+    Args:
+        samples: Those of every region; single ones tell no error of their mean.
+    """
+    several = any(len(region.surfaces) > 1 for region in samples)
+    return [cause for cause in CAUSES if several or cause != "samples"]
+
+
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
+    """Yield the memory that measuring the errors of a load step takes beside that of the run.
+
+    Args:
+        bodies: What is known of the bodies, by their section of the scene.
+    """
+    raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
+    if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
+        return
+    for key, body in raised.items():
+        asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
+        purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
+        yield replace(asked, key="output.check", purpose=purpose, shared=_TOLD * asked.shared)
+
+
+def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:
+    """Yield what the measured errors of a load step leave out.
+
+    Args:
+        samples: Those of every region.
+        step: The load step.
+    """
+    alone = [region.name for region in samples if len(region.surfaces) == 1]
+    if alone:
+        yield (
+            f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
+            "others would change is not known (law.seeds gives a spectrum several)"
+        )
+    if step.shear_errors and step.step > MOST_REMEMBERED:
+        yield Caution(
+            f"the error of the shear by its load steps is that of the last {MOST_REMEMBERED} of "
+            f"{step.step}: earlier ones are not remembered, and what they erred by is not known "
+            "where contacts have stuck since"
+        )
+    if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
+        yield Caution(
+            "the error by mesh was not measured: quadratic elements, which would tell that of "
+            f"linear ones, have more than {MOST_CHECKED_UNKNOWNS} unknowns on this mesh; take a "
+            "coarser mesh with quadratic elements, whose error linear ones tell"
+        )
