@@ -31,10 +31,6 @@ Curves = Callable[[LawRows], LawCurves]
 MOST_ROWS = 97
 """Rows that are solved at most by default."""
 
-ROW_ERROR = 5e-4
-"""Error of a force at a row over that between rows. With a tolerance of 2e-3 it was up to 3e-6 on
-three surfaces; with rows solved to rounding they take a third longer."""
-
 _FIRST_ROWS = 9
 _LARGEST_FALL, _LEAST_GAP = float(np.log(2.0)), 1e-4
 """Logarithm of the ratio of the mean gaps of two rows that is not exceeded, down to this part of
