@@ -79,7 +79,8 @@ def consistent_laws(
 
     In the macro model whose displacements they were made with they give back the solution they
     were made from, whatever the partition: to rounding at their rows, and between them to the
-    error that the table states. Where the plane is free to turn, it turns in the rows too.
+    error that the table states. Rows of few cells are solved to a hundredth of the tolerance. Where
+    the plane is free to turn, it turns in the rows too.
 
     Args:
         model: Micro model of the whole surface, on the body that the laws are for.

@@ -45,6 +45,9 @@ _MOST = 0.9
 """Largest mean pressure under which finite slopes are solved for, over the Young's modulus."""
 _PART = 2e-3
 """Error of the mean pressure where such a law ends, over that which closes the flat sample."""
+_ROW_ERROR = 5e-4
+"""Residual of a row over the tolerance of the law."""
+
 _ROWS_TOGETHER = 2
 """Rows of a sample that one rank solves in sequence, each starting from the one before, so that
 results do not depend on the number of ranks."""
