@@ -39,9 +39,9 @@ every load step lies between two rows."""
 
 _ROW_ERROR = 1e-2
 """Residual of a row of few cells over the tolerance of the table. With a tolerance of 2e-3 forces
-at rows of six surfaces erred by up to 1e-4, pressures of patches by up to 3e-4. With 5e-4 these were
-3e-6, with twice to 2.5 times as many evaluations of finite slopes; errors between rows were the
-same."""
+at rows of six surfaces erred by up to 1e-4, pressures of patches by up to 3e-4. With 5e-4 these
+were 3e-6, with twice to 2.5 times as many evaluations of finite slopes; errors between rows were
+the same."""
 
 _POINTWISE_RESERVE = 0.5
 """The same for laws that are evaluated at points. Where a point is displaced less than its patch in
