@@ -22,7 +22,7 @@ from patchlaw.micro import HalfSpaceModel, Start, press_along
 from patchlaw.multiscale.laws.interpolation import rising_curves
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, RowMaker, refined
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support import Array, InputError, shared
@@ -45,6 +45,9 @@ _MOST = 0.9
 """Largest mean pressure under which finite slopes are solved for, over the Young's modulus."""
 _PART = 2e-3
 """Error of the mean pressure where such a law ends, over that which closes the flat sample."""
+_ROW_ERROR = 5e-4
+"""Residual of a row over the tolerance of the law."""
+
 _ROWS_TOGETHER = 2
 """Rows of a sample that one rank solves in sequence, each starting from the one before, so that
 results do not depend on the number of ranks."""
@@ -121,7 +124,7 @@ def representative_law(
         lambda sample: HalfSpaceModel(sample, contact_modulus=contact_modulus, periodic=True)
     )
     face = PeriodicSamples(
-        samples=tuple(_checked(sample, make, ROW_ERROR * tolerance) for sample in samples),
+        samples=tuple(_checked(sample, make, _ROW_ERROR * tolerance) for sample in samples),
         comm=comm,
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )

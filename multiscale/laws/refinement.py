@@ -31,10 +31,6 @@ Curves = Callable[[LawRows], LawCurves]
 MOST_ROWS = 97
 """Rows that are solved at most by default."""
 
-ROW_ERROR = 5e-4
-"""Error of a force at a row over that between rows. With a tolerance of 2e-3 it was up to 3e-6 on
-three surfaces; with rows solved to rounding they take a third longer."""
-
 _FIRST_ROWS = 9
 _LARGEST_FALL, _LEAST_GAP = float(np.log(2.0)), 1e-4
 """Logarithm of the ratio of the mean gaps of two rows that is not exceeded, down to this part of
@@ -221,13 +217,16 @@ def _left_out(
     first = np.clip(inner - _BESIDE, 0, count - width)
     window = first[:, None] + np.arange(width)
     window = window[window != inner[:, None]].reshape(len(inner), width - 1)
-    own = rows[inner]
+    touched, own = np.flatnonzero(rows.pressure.any(axis=0)), rows[inner]  # most stay open
     without = curves(
-        rows.mapped(lambda each: np.moveaxis(each[window], 1, 0).reshape(width - 1, -1))
+        rows[:, touched].mapped(lambda each: np.moveaxis(each[window], 1, 0).reshape(width - 1, -1))
     )
-    guess = without.at(np.arange(len(inner) * patches).reshape(-1, patches), own.approach)
-    stiffness = _stiffness(laws.at(np.arange(patches), own.approach), compliance)
-    errors = errors_at(guess, stiffness, own, compliance, least)
+    point = laws.at(np.arange(patches), own.approach)
+    stiffness = _stiffness(point, compliance)
+    law = np.arange(len(inner) * len(touched)).reshape(-1, len(touched))
+    for field, part in zip(point, without.at(law, own.approach[:, touched]), strict=True):
+        field[:, touched] = part
+    errors = errors_at(point, stiffness, own, compliance, least)
     return np.pad(errors, ((1, 1), (0, 0)))
 
 
