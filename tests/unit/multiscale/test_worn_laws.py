@@ -187,6 +187,41 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-9)
 
 
+@pytest.mark.parametrize("prescribed", ["force", "approach"])
+def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(prescribed):
+    """Also at distances between those that laws were made for, where load steps are halved."""
+    quiet = {"figures": False, "report": False, "check": "none"}
+    load = {"steps": 1, "tilt": "free", "sliding": [1.3e3, 2.9e4]}
+    if prescribed == "force":
+        load["force"] = "21 N"
+    else:
+        load |= {"approach": "6 um", "force_change": 0.3}
+    laws, cells = (
+        run(of_patches(kind, load=load, output=quiet)) for kind in ("consistent", "concurrent")
+    )
+    of_force, of_volume = (1e-12, 1e-9) if prescribed == "force" else (0.03, 0.03)
+    for name, share in (
+        ("approach_mm", 2e-4),
+        ("tilt_x", 0.01),
+        ("tilt_y", 0.01),
+        ("force_N", of_force),
+        ("mean_separation_mm", 5e-3),
+        ("worn_volume_mm3", of_volume),
+        ("dissipated_mJ", of_volume),
+    ):
+        known = getattr(cells, name)
+        off = np.abs(getattr(laws, name) - known).max()
+        assert off < share * np.abs(known).max(), name
+    turned = np.hypot(*(np.subtract(*one[[-1, 0]]) for one in (cells.tilt_x, cells.tilt_y)))
+    assert turned > 1e-3
+    # a load step that is taken back takes back the surface that had slid
+    model = laws.coupling.model
+    past, stiffness = model.past, model.stiffness()[:2]
+    model.press(Control(force=1.0, tilt=None))
+    model.past = past
+    assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-12)
+
+
 def test_laws_of_patches_wear_and_yield_as_their_cells():
     """Laws are made of heights that are lower by both depths; faces know what has worn off."""
     quiet = {"figures": False, "report": False, "check": "none"}
