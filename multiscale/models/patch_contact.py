@@ -97,8 +97,8 @@ class PatchContact(LawModel):
 class _FreeLaws:
     """Laws under a plane without moment, of a surface that has slid by some distance.
 
-    They and the path of the plane are linear between two distances, at equal approaches to what is
-    left of the surface.
+    They and the path of the plane are linear between two distances, at approaches equally far from
+    those of the largest load.
 
     Args:
         levels: What the surface has become by these distances, the new one first.
@@ -116,9 +116,9 @@ class _FreeLaws:
         parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
         self._parts, self.slid = parts[: 1 + (share > 0.0)], slid
         self.worn: Array = np.sum([part * one.depth for part, one, _ in self._parts], axis=0)
-        path, *further = (one.path for _, one, _ in self._parts if one.path is not None)
-        left = path.mixed(further[0], share) if further else path
-        self.path = left.shifted(float(self.worn.mean()))
+        self._end = float(sum(part * _end(one) for part, one, _ in self._parts))
+        path, *further = (one.path.shifted(-_end(one)) for _, one, _ in self._parts if one.path)
+        self.path = (path.mixed(further[0], share) if further else path).shifted(self._end)
 
     def along(self, approach: float) -> LawPoint:
         """Return what the laws give at an approach."""
@@ -135,13 +135,19 @@ class _FreeLaws:
         return np.sum([part * laws.interface_stiffness(at) for part, _, laws, at in points], axis=0)
 
     def _local(self, one: WornLaws, approach: float) -> Array:
-        """Return local approaches to what was left at one of the distances."""
-        return approach - float(self.worn.mean()) + float(one.depth.mean()) - one.depth
+        """Return local approaches at one of the distances, equally far from the end of its rows."""
+        return approach - self._end + _end(one) - one.depth
 
     def _mixed(self, evaluate: Callable[[WornLaws, PatchLaws], LawPoint]) -> LawPoint:
         found = ((part, evaluate(one, laws)) for part, one, laws in self._parts)
         points = ([part * field for field in point] for part, point in found)
         return LawPoint._make(np.sum(fields, axis=0) for fields in zip(*points, strict=True))
+
+
+def _end(level: WornLaws) -> float:
+    """Return the largest approach that laws were made for [mm]."""
+    assert level.path is not None, "laws of free planes have paths"
+    return float(level.path.approach[-1])
 
 
 class FreePlaneContact(LawModel):

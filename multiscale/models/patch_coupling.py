@@ -180,8 +180,7 @@ class PatchCoupling(CellCoupling):
             model = self._worn_model(depth)
             made = self._with_leak(self._consistent(model, load, **options), model, depth, load)
             laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))
-            turns = made.path and made.path.shifted(-float(means.mean()))
-            worn.append(WornLaws(depth=means, laws=laws, slid=slid, path=turns))
+            worn.append(WornLaws(depth=means, laws=laws, slid=slid, path=made.path))
             error = max(error, made.force_error)
         return replace(table, worn=tuple(worn), force_error=error)
 
