@@ -61,11 +61,13 @@ class WornLaws:
         laws: One law for each, whose closures are less by these depths.
         slid: Distance that the whole surface has slid by then [mm], which laws of patches depend
             on; None of those that depend on the depth.
+        path: The planes that pressed it, where they were free to turn.
     """
 
     depth: Array
     laws: tuple[PatchLaw, ...]
     slid: float | None = None
+    path: PlanePath | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -244,7 +246,7 @@ class LawTable(Displayed):
         return replace(
             self._mapped(lambda laws: tuple(law.shifted(-zero) for law in laws)),
             made_by=self.made_by | {"zero": name},
-            path=None if path is None else replace(path, approach=path.approach - zero),
+            path=None if path is None else path.shifted(-zero),
         )
 
     def notes(self, tolerance: float) -> Iterator[str]:

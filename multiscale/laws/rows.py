@@ -292,6 +292,31 @@ class PlanePath:
             return np.append(self.tilt, self.moment)
         return np.asarray(self._curves(np.clip(approach, self.approach[0], self.approach[-1])))
 
+    def shifted(self, distance: float) -> PlanePath:
+        """Return the path with approaches counted from a plane that is higher.
+
+        Args:
+            distance: How much higher it is [mm].
+        """
+        return replace(self, approach=self.approach + distance)
+
+    def mixed(self, other: PlanePath, share: float) -> PlanePath:
+        """Return a path on the way to another, linear at equal approaches.
+
+        Args:
+            other: The other path.
+            share: How much of it, from 0 to 1.
+        """
+        every = np.union1d(self.approach, other.approach)
+        every = every[every <= min(self.approach[-1], other.approach[-1])]
+        (here, bears), (there, load) = (
+            (np.array([path.at(one) for one in every]), np.interp(every, path.approach, path.force))
+            for path in (self, other)
+        )
+        turns = (1.0 - share) * here + share * there
+        force = (1.0 - share) * bears + share * load
+        return PlanePath(approach=every, tilt=turns[:, :2], force=force, moment=turns[:, 2:])
+
     def turning(self, approach: float) -> Array:
         """Return what the slopes change by with the approach, shape (2,) [1/mm].
 

@@ -6,6 +6,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.rigid_plane import UNSUPPORTED, plane_failure
 from patchlaw.micro import NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
@@ -93,6 +94,62 @@ class PatchContact(LawModel):
         self._last = state
 
 
+class _FreeLaws:
+    """Laws under a plane without moment, of a surface that has slid by some distance.
+
+    They and the path of the plane are linear between two distances, at approaches equally far from
+    those of the largest load.
+
+    Args:
+        levels: What the surface has become by these distances, the new one first.
+        slid: The distance [mm].
+
+    Attributes:
+        worn: Depths that have worn off the patches, shape (N,) [mm].
+        path: How the plane turns.
+    """
+
+    def __init__(self, levels: Sequence[tuple[WornLaws, PatchLaws]], slid: float) -> None:
+        distances = [one.slid or 0.0 for one, _ in levels]
+        place = float(np.interp(slid, distances, np.arange(len(distances))))
+        below, share = int(place), place % 1.0
+        parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
+        self._parts, self.slid = parts[: 1 + (share > 0.0)], slid
+        self.worn: Array = np.sum([part * one.depth for part, one, _ in self._parts], axis=0)
+        self._end = float(sum(part * _end(one) for part, one, _ in self._parts))
+        path, *further = (one.path.shifted(-_end(one)) for _, one, _ in self._parts if one.path)
+        self.path = (path.mixed(further[0], share) if further else path).shifted(self._end)
+
+    def along(self, approach: float) -> LawPoint:
+        """Return what the laws give at an approach."""
+        return self._mixed(lambda one, laws: laws.along(self._local(one, approach)))
+
+    def untouched(self, closure: Array) -> LawPoint:
+        """Return what the laws give at closures, (N,) [mm], up to first touch."""
+        every = np.arange(len(closure))
+        return self._mixed(lambda _, laws: laws.at(every, np.minimum(closure, laws.first_touch)))
+
+    def interface_stiffness(self, approach: float) -> Array:
+        """Return −dp/dū of the patches at an approach, shape (N,) [MPa/mm]."""
+        points = ((*one, one[2].along(self._local(one[1], approach))) for one in self._parts)
+        return np.sum([part * laws.interface_stiffness(at) for part, _, laws, at in points], axis=0)
+
+    def _local(self, one: WornLaws, approach: float) -> Array:
+        """Return local approaches at one of the distances, equally far from the end of its rows."""
+        return approach - self._end + _end(one) - one.depth
+
+    def _mixed(self, evaluate: Callable[[WornLaws, PatchLaws], LawPoint]) -> LawPoint:
+        found = ((part, evaluate(one, laws)) for part, one, laws in self._parts)
+        points = ([part * field for field in point] for part, point in found)
+        return LawPoint._make(np.sum(fields, axis=0) for fields in zip(*points, strict=True))
+
+
+def _end(level: WornLaws) -> float:
+    """Return the largest approach that laws were made for [mm]."""
+    assert level.path is not None, "laws of free planes have paths"
+    return float(level.path.approach[-1])
+
+
 class FreePlaneContact(LawModel):
     """Consistent laws under a plane without moment.
 
@@ -104,22 +161,26 @@ class FreePlaneContact(LawModel):
     Every load step is found without those before it.
 
     Args:
-        table: The laws, with the path of the plane.
+        table: The laws, with the path of the plane; those of a surface that wears have theirs too.
         displacements: Mean displacements of the patches by their pressures in the macro model.
             Collective.
+        heat: Energy that friction takes for the volume that wears off, μ/k [MPa].
 
     Raises:
         ValueError: When the laws have no path.
     """
 
-    def __init__(self, table: LawTable, displacements: Displacements) -> None:
+    wear_errors = (0.0,) * 6
+    """Errors by the steps of wear beyond those of the surface, see `micro.wear.Worn`."""
+
+    def __init__(self, table: LawTable, displacements: Displacements, heat: float = 0.0) -> None:
         if table.path is None:
             raise ValueError("the laws were made under a plane of given tilt")
         super().__init__(table)
-        self._path, self._laws = table.path, table.together()
-        self._displacements = displacements
-        self._approach: float | None = None
-        self._open: LawPoint | None = None
+        new = WornLaws(depth=np.zeros(table.grid.count), laws=table.laws, slid=0.0, path=table.path)
+        self._levels = [(one, PatchLaws(one.laws)) for one in (new, *table.worn)]
+        self._displacements, self._heat, self.wears = displacements, heat, bool(table.worn)
+        self.past: tuple[_FreeLaws, float, LawPoint] | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `Model.press`.
@@ -127,19 +188,21 @@ class FreePlaneContact(LawModel):
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        path, patches = self._path, self.table.grid
-        approach, evaluations = control.approach, 0
+        laws, patches = _FreeLaws(self._levels, control.slid), self.table.grid
+        path, approach, evaluations = laws.path, control.approach, 0
         if approach is None:
-            approach, evaluations = path.approach_under(control.force or 0.0, self._force)
+            approach, evaluations = path.approach_under(
+                control.force or 0.0, lambda at: self._force(laws.along(at))
+            )
         end = float(path.approach[-1])
         if approach > end + ROUNDING * abs(end):
             problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
             raise self.beyond_law(control, problem)
         tx, ty, *moment = map(float, path.at(approach))
-        point = self._along(approach)
+        point = laws.along(approach)
         xc, yc = map(float, patches.middle)
         local = RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)).means(patches)
-        closure = local - self._displacements(point.pressure[None])[0]
+        closure = local - laws.worn - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0
         if residual > 0.05:  # between rows of laws of this macro model it is hundredths of that
@@ -150,42 +213,52 @@ class FreePlaneContact(LawModel):
                 remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
                 "this block and mesh",
             )
-        self._approach = approach
         # of those that stay open, the approach at the middle is not that of the law
-        reached = np.minimum(closure, self._laws.first_touch)
-        self._open = self._laws.at(np.arange(patches.count), reached)
-        separation = np.where(point.pressure > 0.0, point.separation, self._open.separation)
-        stiffness = self._laws.interface_stiffness(point)
+        open_ = laws.untouched(closure)
+        self.past = laws, approach, open_
+        separation = np.where(point.pressure > 0.0, point.separation, open_.separation)
+        stiffness = laws.interface_stiffness(approach)
         return LoadStep.of_patches(
             patches,
             plane=(approach, tx, ty),
-            load=(self._force(approach), *moment),
+            load=(self._force(point), *moment),
             patches=PatchState(closure, point.pressure, point.contact_area_fraction, stiffness),
             separation=separation,
             contacts=point.contacts,
             newton_iterations=evaluations,
+            **self._of_wear(laws),
         )
+
+    def _of_wear(self, laws: _FreeLaws) -> dict[str, Any]:
+        """Return what has worn off the surface."""
+        if not self.wears:
+            return {}
+        volume = self.table.grid.area * float(laws.worn.sum())
+        return {
+            "slid_mm": laws.slid,
+            "worn_volume_mm3": volume,
+            "mean_worn_depth_mm": float(laws.worn.mean()),
+            "worn_depth_mm": float(laws.worn.max()),
+        } | ({"dissipated_mJ": self._heat * volume} if self._heat else {})
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""
-        if self._approach is None or self._open is None:
+        if self.past is None:
             return NormalStiffness()
-        patches, point = self.table.grid, self._along(self._approach)
+        laws, approach, open_ = self.past
+        patches, point = self.table.grid, laws.along(approach)
         force = patches.area * float(point.dpressure.sum())
-        tx, ty = map(float, self._path.turning(self._approach))
+        tx, ty = map(float, laws.path.turning(approach))
         xc, yc = map(float, patches.middle)
         coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
         closing = coming - self._displacements(point.dpressure[None])[0]
-        closing *= -self._open.dseparation
+        closing *= -open_.dseparation
         closed = np.where(point.pressure > 0.0, -point.dseparation, closing)
-        own = whole_stiffness(self._laws.interface_stiffness(point), closed, point.dpressure)
+        own = whole_stiffness(laws.interface_stiffness(approach), closed, point.dpressure)
         return NormalStiffness(patches.area * own, force)
 
-    def _force(self, approach: float) -> float:
-        return self.table.grid.area * float(self._along(approach).pressure.sum())
-
-    def _along(self, approach: float) -> LawPoint:
-        return self._laws.along(np.full(self.table.grid.count, approach))
+    def _force(self, point: LawPoint) -> float:
+        return self.table.grid.area * float(point.pressure.sum())
 
 
 def equilibrium(

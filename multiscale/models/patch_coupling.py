@@ -121,7 +121,7 @@ class PatchCoupling(CellCoupling):
             largest=largest,
             displacements=self.bodies.patch_displacements(self.table_rows),
             # closures between two depths are not those of rows
-            pointwise=self.scene.coupling.interface == "pointwise" or self.scene.wear is not None,
+            pointwise=self.scene.coupling.interface == "pointwise" or self.scene.wears_on_mesh,
             **options,
         )
 
@@ -180,7 +180,7 @@ class PatchCoupling(CellCoupling):
             model = self._worn_model(depth)
             made = self._with_leak(self._consistent(model, load, **options), model, depth, load)
             laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))
-            worn.append(WornLaws(depth=means, laws=laws, slid=slid))
+            worn.append(WornLaws(depth=means, laws=laws, slid=slid, path=made.path))
             error = max(error, made.force_error)
         return replace(table, worn=tuple(worn), force_error=error)
 
@@ -280,7 +280,9 @@ class PatchCoupling(CellCoupling):
             with self.clock.phase("laws"):
                 table = self.table = self._with_wear(table)
         if table.path is not None and self._pressed_evenly:
-            return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
+            moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
+            heat = rubs.coefficient / section.coefficient if rubs and section else 0.0
+            return FreePlaneContact(table, moved, heat)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem

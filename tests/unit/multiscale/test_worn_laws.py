@@ -187,6 +187,32 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-9)
 
 
+def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(tmp_path):
+    """Also at a distance between two that laws were made for."""
+    quiet = {"figures": False, "report": False, "check": "none"}
+    load = {"force": "21 N", "steps": 1, "tilt": "free"}
+    given, cells = (
+        of_patches(kind, load=load | {"sliding": slid}, output=quiet)
+        for kind, slid in (("consistent", [6.1e3]), ("concurrent", [3e3, 6.1e3]))
+    )
+    laws = ran_past(given, 1, tmp_path / "checkpoint.state")
+    model, (new, between, last) = laws.coupling.model, run(cells).steps
+    past, stiffness = model.past, model.stiffness()[:2]
+    found = [*laws.history().steps, model.press(Control(force=21.0, tilt=None, slid=3e3))]
+    for own, true in zip(found, (new, last, between), strict=True):
+        for name, share in (("approach_mm", 2e-3), ("mean_separation_mm", 2e-3)):
+            assert getattr(own, name) == pytest.approx(getattr(true, name), rel=share), name
+        assert own.tilt == pytest.approx(true.tilt, abs=0.01 * np.hypot(*new.tilt))
+        for name in ("force_N", "worn_volume_mm3", "dissipated_mJ"):
+            known = getattr(true, name)
+            # volumes between two distances are as linear as they are
+            assert getattr(own, name) == pytest.approx(known, rel=1e-9, abs=1e-12), name
+    assert np.hypot(*np.subtract(new.tilt, last.tilt)) > 0.05 * np.hypot(*new.tilt)
+    # a load step that is taken back takes back the surface that had slid
+    model.past = past
+    assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-12)
+
+
 def test_laws_of_patches_wear_and_yield_as_their_cells():
     """Laws are made of heights that are lower by both depths; faces know what has worn off."""
     quiet = {"figures": False, "report": False, "check": "none"}
