@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# OpenSees 3.7.1 (openseespy), zeroLengthContact2D and zeroLengthContact3D: the friction of a node that slides.
+# OpenSees 3.7.1 (openseespy; 3.8.0 does the same), zeroLengthContact2D and zeroLengthContact3D: the friction of a node that slides.
 #
 # Guess: the reaction of the held node under it, and the force of the element, are pressure and friction; reactions balance the load.
 # Seen: while it sticks, so they are. As it slides, friction stops the node as it should, by µ N, but is missing in the reaction
