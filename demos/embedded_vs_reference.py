@@ -78,7 +78,7 @@ parts = {
     "small slopes, concurrent": flat / final["concurrent"] - 1.0,
     "laws of the whole surface": final["consistent"] / final["concurrent"] - 1.0,
     **{name: final[name] / flat - 1.0 for name in isolated.values()},  # of small slopes, too
-    "finest mesh of the reference": record.force_N[-1, -1] / truth - 1.0,
+    "finest mesh of the reference": record.force.meshes[-1, -1] / truth - 1.0,
     "what is left, concurrent": final["concurrent"] / truth - 1.0,
 }
 print("\n".join(f"  part: {name:30s} {part:+8.2%}" for name, part in parts.items()))

@@ -245,9 +245,12 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When anything is wrong; names file, key, value and what is allowed.
         """
-        data = _copied(data)
         with located(str(source) if source else None):
-            refuse_removed(data)
+            try:
+                data = _copied(data)
+                refuse_removed(data)
+            except RecursionError:
+                raise InputError("is nested too deeply, or within itself") from None
             sections = read(SceneSections, data, _unknown_key)
             scene = cls(**part_of(sections, SceneSections), source=source, written=data)
             check_together(scene, scene.stated("coupling"))

@@ -176,3 +176,16 @@ def test_tolerance_that_is_missed_is_said(tolerance, missed):
         note for note in run.history().notes if "the laws miss coupling.table_tolerance" in note
     ]
     assert len(said) == missed
+
+
+def test_intervals_halved_for_their_gap_alone_may_have_no_error_at_all():
+    """Of nothing over nothing errors became NaN, and rows were added no more."""
+
+    def solve(approach):
+        return rows_of(approach, np.ones((len(approach), 2)))
+
+    found = refined(RowMaker(solve, curves, COMPLIANCE, 0.02), 0.0, 19.9e-3, 2e-3)
+    gaps = (0.02 - found.rows.closure).mean(axis=1)
+    assert len(found.rows) > 9  # the gap of the last of nine intervals falls by more than a half
+    assert np.all(gaps[:-1] < 2.0 * np.maximum(gaps[1:], 1e-4 * gaps[0]) * (1 + 1e-12))
+    assert found.force == 0.0

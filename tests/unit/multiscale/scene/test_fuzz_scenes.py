@@ -127,6 +127,7 @@ def test_force_beyond_the_block(tmp_path):
         (b"#" * (MOST_BYTES + 1), f"larger than any scene .allowed: {MOST_BYTES} bytes"),
         (b"x = " + b"[" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"{a=" * 10**4, "is not valid TOML: it is nested too deeply"),
+        (b"x" + b".x" * 10**4 + b" = 1", "is nested too deeply, or within itself"),
         (b"x = " + b"1" * 10**4, "is not valid TOML: Exceeds the limit"),
         (b"x = 0x" + b"f" * 10**4, "x: unknown key"),
         (b"accuracy = 0x" + b"f" * 10**4, "accuracy = <int>: must be a valid number"),
@@ -137,7 +138,7 @@ def test_force_beyond_the_block(tmp_path):
         (b"[surface]\n", "surface: needs exactly one source"),
         (b"", "surface: is required and missing"),
     ],
-    ids=range(12),
+    ids=range(13),
 )
 def test_files_that_are_no_scenes(tmp_path, content, text):
     path = tmp_path / "scene.toml"
@@ -171,3 +172,10 @@ def test_override_of_endless_sections(tmp_path):
     path.write_text(toml(BASE), encoding="utf-8")
     with pytest.raises(InputError, match="is not an override"):
         Scene.load(path, ["a." * 5000 + "b=1"])
+
+
+def test_sections_within_themselves_are_refused():
+    section = {}
+    section["surface"] = section
+    with pytest.raises(InputError, match="is nested too deeply, or within itself"):
+        Scene.from_dict(section)
