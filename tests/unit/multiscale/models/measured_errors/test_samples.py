@@ -19,7 +19,11 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.models.measured_errors.samples import (
+    closure_under,
+    interpolation_errors,
+    mean_error,
+)
 from patchlaw.multiscale.readable import quantity
 from patchlaw.support import InputError
 
@@ -203,6 +207,14 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     closure = law.rows.closure[[1, -1]]
     found = interpolation_errors(known, closure)
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
+
+
+def test_closures_under_pressures_near_first_touch_are_those_of_the_law():
+    """Read off between even places, 1e-9 of the largest pressure led to 3e-12 of it."""
+    law = SimpleNamespace(range=(-0.3, 1.1), pressure=lambda closure: 7.0 * (closure + 0.3) ** 1.5)
+    pressure = np.geomspace(1e-12, 1.0, 37) * law.pressure(1.1)
+    assert law.pressure(closure_under(law, pressure)) == pytest.approx(pressure, rel=2e-3)
+    assert closure_under(law, np.array([0.0, 1e9])) == pytest.approx([-0.3, 1.1])
 
 
 class NearlyClosed:
