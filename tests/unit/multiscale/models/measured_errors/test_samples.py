@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
+from patchlaw.macro.contact import other_elements
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import faces as law_errors
 from patchlaw.multiscale.models.measured_errors.errors import response_of
@@ -25,7 +26,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     mean_error,
 )
 from patchlaw.multiscale.readable import quantity
-from patchlaw.support import InputError
+from patchlaw.support import InputError, NotConverged
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks
@@ -277,6 +278,45 @@ def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
         assert errors["quadrature"] < 1e-4 * step.force_N
         assert 0.0 < errors["mesh"] < 0.1 * step.force_N
     assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
+
+
+@pytest.mark.long
+def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monkeypatch):
+    made, own = [], other_elements.face_on
+
+    def face_on(*given, **options):
+        made.append(given)
+        return own(*given, **options)
+
+    monkeypatch.setattr(other_elements, "face_on", face_on)
+    known = scene(mesh, output={"check": "all"})
+    whole = Run(known)
+    kept = list(whole.load_steps())
+    assert len(made) == 2  # with quadratic elements, and with more points
+    assert set(whole.coupling._elsewhere) == {"finer", "nearer", "quadratic"}
+    whole.close()
+    assert not whole.coupling._elsewhere
+    monkeypatch.setattr(law_errors, "_MOST_KEPT_UNKNOWNS", 0)
+    fresh = run(known).steps
+    assert len(made) == 2 + 2 * len(fresh)
+    for one, other in zip(kept, fresh, strict=True):
+        abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
+        assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
+
+
+def test_other_elements_whose_contact_fails_are_not_used_again():
+    probe = LawErrorProbe(
+        **dict.fromkeys(("problem", "face", "state", "cells", "step")),
+        problem_with=lambda face, table: object(),
+        table=None,
+        samples=(),
+        new_laws=(),
+        elsewhere={"finer": ("known", None, known := object())},
+    )
+    with pytest.raises(NotConverged), probe._other("finer", lambda face: "new") as problem:
+        assert problem is known
+        raise NotConverged("a contact", reason="MAX_IT", iterations=1, remedy="smaller steps")
+    assert not probe.elsewhere
 
 
 def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
