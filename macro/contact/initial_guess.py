@@ -155,7 +155,7 @@ class DisplacementBasis:
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
         pressure = y @ self._stresses[..., 0]
         sampled = self._stretches[..., 0] / self._sampling.weight
-        closure = forces.closure_of(y @ sampled)
+        closure = forces.guessed_closure(y @ sampled)
         lines = law_lines(forces, closure, pressure, stiffness)
         for _ in range(_STEPS):
             change = self._step(y, lines)
@@ -262,7 +262,7 @@ class SpringGuess:
         stiffness = self._stiffness_of(contact)
         before = self.pressures[contact] * moved
         displaced = forces.sampling.displacements(displacement)
-        closure = forces.closure_of(displaced)
+        closure = forces.guessed_closure(displaced)
         rest = np.array([before, displaced])
         return Start(closure, before, forces.last_shear, stiffness, rest)
 

@@ -24,7 +24,7 @@ from patchlaw.geometry.rigid_plane import (
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, SingleLaws
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.support import Array, Flags, Indices, InputError, together
+from patchlaw.support import Array, Flags, Indices, InputError, NotConverged, together
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
@@ -128,17 +128,12 @@ class PressedPlane:
         Raises:
             NotConverged: When nothing can hold the plane.
         """
-        matrix, weight = self.levers.matrix, self.weight
-
-        def closure(plane: Array) -> Array:
-            # no other order of the sums: first touch is found to the last digit of closures
-            return matrix @ plane - self.open_gap - displacement
 
         def respond(plane: Array) -> PlaneResponse[Array]:
-            closed = closure(plane)
+            closed = self._closure_at(plane, displacement)
             return PlaneResponse(
                 loads=self.loads(self.pressure(closed)),
-                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closed)),
+                stiffness=lambda: self.levers.stiffness(self.weight * self.stiffness(closed)),
                 state=closed,
             )
 
@@ -151,9 +146,24 @@ class PressedPlane:
             )
             self.plane = np.array([approach, *slopes])
         if not self.control.free.any():
-            return closure(self.plane)
+            return self._closure_at(self.plane, displacement)
         self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
         return closed
+
+    def guessed_closure(self, displacement: Array) -> Array:
+        """Return closures to start from; see `closure_of`.
+
+        Where the body does not give way yet, steep laws may press so much that no equilibrium of
+        the plane is found. It then stays where it is.
+        """
+        try:
+            return self.closure_of(displacement)
+        except NotConverged:
+            return self._closure_at(self.plane, displacement)
+
+    def _closure_at(self, plane: Array, displacement: Array) -> Array:
+        # no other order of the sums: first touch is found to the last digit of closures
+        return np.asarray(self.levers.matrix @ plane - self.open_gap - displacement)
 
     def closure_on_lines(self, displacement: Array, lines: Lines) -> Array:
         """Bring the plane into equilibrium on laws that are lines, and return the closures.
@@ -163,7 +173,7 @@ class PressedPlane:
             lines: The laws as lines.
         """
         levers, free, weight = self.levers, self.control.free, self.weight
-        closure = levers.matrix @ self.plane - self.open_gap - displacement
+        closure = self._closure_at(self.plane, displacement)
         if not free.any():
             return closure
         missing = self.control.loads - levers.loads(weight * lines.at(closure))
@@ -174,7 +184,7 @@ class PressedPlane:
         )
         self.plane = self.plane.copy()
         self.plane[free] += unit * scaled[0]
-        return levers.matrix @ self.plane - self.open_gap - displacement
+        return self._closure_at(self.plane, displacement)
 
     @property
     def open_gap(self) -> Array:

@@ -34,8 +34,8 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
-    PLACES,
     SampleProbe,
+    closure_under,
     interpolation_errors,
     mean_error,
 )
@@ -245,12 +245,7 @@ class LawErrorProbe(SampleProbe):
 
     def _closures_under(self, pressure: Array, patch: Indices) -> Array:
         """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
-
-        def closures(law: PatchLaw, pressure: Array) -> Array:
-            places = np.linspace(*law.range, PLACES)
-            return np.interp(pressure, law.pressure(places), places)
-
-        return self._by_law(closures, pressure, patch)
+        return self._by_law(closure_under, pressure, patch)
 
     def _by_law(
         self, function: Callable[[PatchLaw, Array], Array], values: Array, patch: Indices

@@ -42,8 +42,9 @@ pressure. Of gaps they are over that of the law."""
 _ROUNDED = 1.2
 """Ratio of pressures that samples are solved under: their errors, relative to the pressure and to
 what is read off, hardly change from one to the next."""
-PLACES = 401
-"""Places on a law that its closure or stiffness at a pressure is read off between."""
+_PLACES = np.union1d(np.linspace(0.0, 1.0, 401), np.geomspace(1e-12, 1.0, 361))
+"""Places on a law, as shares of its range, that its closure under a pressure is read off between:
+close to each other near first touch, where pressures are powers of the closure."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
 
@@ -282,8 +283,19 @@ def _rounded(law: PatchLaw, closure: float) -> float:
     if not (pressure := float(law.pressure(closure))):
         return closure
     power = _ROUNDED ** round(math.log(pressure, _ROUNDED))
-    closures = np.linspace(*law.range, PLACES)
-    return float(np.interp(power, law.pressure(closures), closures))
+    return float(closure_under(law, np.array(power)))
+
+
+def closure_under(law: PatchLaw, pressure: Array) -> Array:
+    """Return the closures of a law under pressures of any shape, at most its last one [mm].
+
+    Args:
+        law: The law.
+        pressure: The pressures [MPa].
+    """
+    start, end = law.range
+    closures = start + (end - start) * _PLACES
+    return np.asarray(np.interp(pressure, law.pressure(closures), closures))
 
 
 def _gap(law: PatchLaw, closure: float) -> float:

@@ -40,7 +40,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe, nearer_by
-from patchlaw.multiscale.models.measured_errors.samples import PLACES, separation_of
+from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -312,10 +312,9 @@ class LawShearProbe(LawErrorProbe):
             for law, factor, closure in zip(
                 self.table.laws, factors, self._points[-1].closure, strict=True
             ):
-                closures = np.linspace(*law.range, PLACES)
-                pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
                 here = float(law.pressure(max(closure, law.range[0])))
-                there, before = np.interp([here / factor, here], pressures, stiffnesses)
+                pressures = np.array([here / factor, here])
+                there, before = law.stiffness(closure_under(law, pressures))
                 found.append(factor * there / before if here > 0.0 < before else 1.0)
             yield np.maximum(found, 0.1)
 
@@ -362,8 +361,7 @@ class LawShearProbe(LawErrorProbe):
             if new is law:
                 found.append(at)
                 continue
-            places = np.linspace(*law.range, PLACES)
-            found.append(np.interp(float(new.pressure(at)), law.pressure(places), places))
+            found.append(closure_under(law, new.pressure(at)))
         return np.array(found)
 
     @cached_property

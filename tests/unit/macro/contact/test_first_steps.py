@@ -9,7 +9,9 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 from patchlaw.geometry import Control, Friction, PatchGrid
+from patchlaw.geometry.rigid_plane import plane_failure
 from patchlaw.macro import LawContactProblem, Material, compat
+from patchlaw.macro.contact import pressed_plane
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import FirstSteps
 from patchlaw.macro.contact.pressed_plane import law_lines
@@ -201,3 +203,23 @@ def test_a_diverged_iterate_is_not_the_best_and_tolerances_come_back(monkeypatch
         case.solve(Control(force=17.3))
     # mm; what is added and taken off again rounds, displacements being some 1e-3
     assert taken == [pytest.approx(0.0, abs=1e-15), 0.0]
+
+
+def test_a_guess_without_equilibrium_of_the_plane_does_not_end_a_load_step(monkeypatch):
+    """As on the undeformed ring of benchmarks/body_errors.py, seed 9303, under a steep law."""
+    face = standing(box((0, 0, -1), (3, 1, 0), (3, 2, 1)), SOFT, HALVES)
+    laws, control = [Exponential(6e-5), Exponential(3e-5)], Control(approach=1e-3, tilt=None)
+    expected = LawContactProblem(face, laws, "pointwise").solve(control)
+    own, planes = pressed_plane.find_equilibrium, []
+
+    def failing(respond, control, start, half):
+        planes.append(start)
+        if len(planes) == 1:
+            raise plane_failure(control, "NO_EQUILIBRIUM")
+        return own(respond, control, start, half)
+
+    monkeypatch.setattr(pressed_plane, "find_equilibrium", failing)
+    found = LawContactProblem(face, laws, "pointwise").solve(control)
+    assert len(planes) > 1
+    assert found.force == pytest.approx(expected.force, rel=1e-8)
+    assert found.plane.motion == pytest.approx(expected.plane.motion, rel=1e-6)

@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
+from patchlaw.macro.contact import other_elements
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import faces as law_errors
 from patchlaw.multiscale.models.measured_errors.errors import response_of
@@ -19,9 +20,13 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.models.measured_errors.samples import (
+    closure_under,
+    interpolation_errors,
+    mean_error,
+)
 from patchlaw.multiscale.readable import quantity
-from patchlaw.support import InputError
+from patchlaw.support import InputError, NotConverged
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks
@@ -205,6 +210,14 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
 
 
+def test_closures_under_pressures_near_first_touch_are_those_of_the_law():
+    """Read off between even places, 1e-9 of the largest pressure led to 3e-12 of it."""
+    law = SimpleNamespace(range=(-0.3, 1.1), pressure=lambda closure: 7.0 * (closure + 0.3) ** 1.5)
+    pressure = np.geomspace(1e-12, 1.0, 37) * law.pressure(1.1)
+    assert law.pressure(closure_under(law, pressure)) == pytest.approx(pressure, rel=2e-3)
+    assert closure_under(law, np.array([0.0, 1e9])) == pytest.approx([-0.3, 1.1])
+
+
 class NearlyClosed:
     """A law whose gap closes as the inverse of the pressure: p = 1 / gap − 1 / 1.2 mm."""
 
@@ -265,6 +278,45 @@ def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
         assert errors["quadrature"] < 1e-4 * step.force_N
         assert 0.0 < errors["mesh"] < 0.1 * step.force_N
     assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
+
+
+@pytest.mark.long
+def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monkeypatch):
+    made, own = [], other_elements.face_on
+
+    def face_on(*given, **options):
+        made.append(given)
+        return own(*given, **options)
+
+    monkeypatch.setattr(other_elements, "face_on", face_on)
+    known = scene(mesh, output={"check": "all"})
+    whole = Run(known)
+    kept = list(whole.load_steps())
+    assert len(made) == 2  # with quadratic elements, and with more points
+    assert set(whole.coupling._elsewhere) == {"finer", "nearer", "quadratic"}
+    whole.close()
+    assert not whole.coupling._elsewhere
+    monkeypatch.setattr(law_errors, "_MOST_KEPT_UNKNOWNS", 0)
+    fresh = run(known).steps
+    assert len(made) == 2 + 2 * len(fresh)
+    for one, other in zip(kept, fresh, strict=True):
+        abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
+        assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
+
+
+def test_other_elements_whose_contact_fails_are_not_used_again():
+    probe = LawErrorProbe(
+        **dict.fromkeys(("problem", "face", "state", "cells", "step")),
+        problem_with=lambda face, table: object(),
+        table=None,
+        samples=(),
+        new_laws=(),
+        elsewhere={"finer": ("known", None, known := object())},
+    )
+    with pytest.raises(NotConverged), probe._other("finer", lambda face: "new") as problem:
+        assert problem is known
+        raise NotConverged("a contact", reason="MAX_IT", iterations=1, remedy="smaller steps")
+    assert not probe.elsewhere
 
 
 def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
