@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from patchlaw.micro import gap_iteration, transport
 from patchlaw.micro.transport import gap_flows
@@ -71,6 +72,26 @@ def test_iterations_that_stand_still_are_no_solution():
     along_x, along_y = gap_flows(np.tile(ridges, (128, 1)), (1.0, 1.0), periodic=True)
     assert along_x.transmissivity == pytest.approx((ridges**3).mean(), rel=1e-7, abs=0)
     assert along_y.transmissivity == pytest.approx(1.0 / (ridges**-3.0).mean(), rel=1e-7, abs=0)
+
+
+def test_pools_at_a_wrong_pressure_are_no_solution(monkeypatch):
+    """Iterations stood still so at 0.3 % too much, with an imbalance as large as the flow."""
+    heights = ndimage.gaussian_filter(np.random.default_rng(40).normal(size=(48, 72)), 2.0)
+    gap = np.maximum(heights / heights.std() + 0.1, 0.0)
+    for one, other in both(gap, monkeypatch, tolerance=1e-4):
+        assert one.transmissivity == pytest.approx(other.transmissivity, rel=1e-4, abs=0)
+
+
+def test_what_drowns_in_rounding_is_no_solution(monkeypatch):
+    """Iterations balanced by their own account, and stated 0.8 % too much."""
+    random = np.random.default_rng(29)
+    wide, fine = (
+        ndimage.gaussian_filter(random.normal(size=(48, 48)), width, mode="wrap")
+        for width in (2.0, 1.0)
+    )
+    gap = np.where(wide > 0.3 * wide.std(), 1.0, 1e-5) * 10.0 ** (0.5 * fine / fine.std())
+    for one, other in both(gap, monkeypatch, periodic=True, tolerance=1e-4):
+        assert one.transmissivity == pytest.approx(other.transmissivity, rel=1e-4, abs=0)
 
 
 def test_slow_maps_end_no_earlier(monkeypatch):

@@ -1,13 +1,20 @@
 """Transmissivities of the patches of one surface, and the table of a sample."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from patchlaw import Spectrum, synthesise
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.laws.transmissivity import patch_transmissivities, sample_transmissivity
+from patchlaw.multiscale.laws import transmissivity
+from patchlaw.multiscale.laws.transmissivity import (
+    flow_memory,
+    patch_transmissivities,
+    sample_transmissivity,
+)
 
 
 def test_patches_whose_borders_cut_cells_leak_as_their_mirror_image():
@@ -42,3 +49,28 @@ def test_no_contact_of_a_table_is_solved_twice(monkeypatch):
     table = sample_transmissivity([model], np.zeros_like)
     assert not table.hydraulic_gap[0].any()  # it closes
     assert len(set(pressed)) == len(pressed)
+
+
+@pytest.mark.long
+def test_a_table_keeps_no_more_memory_than_plan_says(monkeypatch):
+    """Of 24 rows, which are many."""
+    samples, make = [], transmissivity._Sample
+
+    def kept(*given):
+        samples.append(make(*given))
+        return samples[-1]
+
+    spectrum = Spectrum(hurst=0.8, waves=(2, 10), rms_slope=0.1, seed=0)
+    surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface, contact_modulus=1000.0, periodic=True, tolerance=1e-6)
+    monkeypatch.setattr(transmissivity, "_Sample", kept)
+    tracemalloc.start()
+    try:
+        sample_transmissivity([model], np.zeros_like)
+        whole = tracemalloc.get_traced_memory()[0]
+        samples.clear()
+        taken = whole - tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    stated = flow_memory(0, surface.heights.size)
+    assert 0.7 * stated < taken <= stated
