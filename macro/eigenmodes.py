@@ -342,7 +342,7 @@ class _Span:
         order = np.argsort(abs(values), kind="stable")
         return values[order], shares[:, order]
 
-    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Array, Array]:
+    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags, Flags]:
         """Return what modes leave of their equations, whether that is no rounding, and too large.
 
         Args:
