@@ -49,6 +49,16 @@ def test_more_modes_than_unknowns_are_refused_by_their_key():
     run.close()
 
 
+@pytest.mark.long
+def test_more_modes_than_linear_elements_have_come_without_the_elements_error():
+    output = {"check": "last", "figures": False, "report": False, "fields": False}
+    run = Run(scene(vibration={"modes": 20}, output=output))
+    (step,) = run.load_steps()
+    assert len(step.modes) == 20  # and 16 of linear elements
+    assert step.modes[0].element_error_Hz is None and step.first_frequency_error_Hz > 0.0
+    run.close()
+
+
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """A run to its end, and the folder of its results."""
