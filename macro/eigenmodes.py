@@ -306,12 +306,13 @@ class _Span:
         if not apart.any():
             return
         rows, momenta = (one[apart] / new.sizes[apart, None] for one in (new.rows, new.momenta))
-        weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
-        apart = weights > _COPY * weights[-1]
-        turned = (turned[:, apart] / np.sqrt(weights[apart])).T
-        first, last = len(self), len(self) + len(turned)
-        for part, one in zip(self._room, (rows, momenta), strict=False):
-            np.matmul(turned, one, out=part[first:last])
+        for _ in range(2):  # vectors that are nearly copies leave 1e-6 of one another at first
+            weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
+            apart = weights > _COPY * weights[-1]
+            turned = (turned[:, apart] / np.sqrt(weights[apart])).T
+            rows, momenta = turned @ rows, turned @ momenta
+        first, last = len(self), len(self) + len(rows)
+        self._room[:2, first:last] = rows, momenta
         fresh = self._room[:, first:last]
         fresh[2] = products(self._problem.stiffness, fresh[0].T).T
         right = self._add(self._room[0, :last] @ fresh[2].T)
@@ -341,8 +342,8 @@ class _Span:
         order = np.argsort(abs(values), kind="stable")
         return values[order], shares[:, order]
 
-    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Array]:
-        """Return what modes leave of their equations, and whether it is more than rounding.
+    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags, Flags]:
+        """Return what modes leave of their equations, whether that is no rounding, and too large.
 
         Args:
             shares: Of a pair the real and the imaginary part of the first, which span what both do.
@@ -352,9 +353,10 @@ class _Span:
         vectors, momenta, forces = self._parts
         mine = shares[:, chosen].T
         left = mine @ forces - (shares @ along).T @ momenta
-        sizes = [left, (mine @ vectors) * self._diagonal]
-        rest, largest = np.sqrt([self._add(np.einsum("kn,kn->k", one, one)) for one in sizes])
-        return left.T, rest > _NOISE * largest
+        own = mine @ forces, _SHIFT * self._problem.largest * (mine @ momenta)
+        sizes = [left, (mine @ vectors) * self._diagonal, *own]
+        rest, most, *usual = np.sqrt([self._add(np.einsum("kn,kn->k", one, one)) for one in sizes])
+        return left.T, rest > _NOISE * most, rest > _LARGEST_RESIDUAL * np.add(*usual)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -426,9 +428,11 @@ def _lowest_eigenpairs(
         if len(errors) != len(limits) or (errors < limits).all():
             errors = np.ones(len(limits))  # once more of all: modes may have changed places
         asked = np.flatnonzero(errors >= limits)
-        left, is_some = span.residuals(real, asked)
+        left, is_some, is_large = span.residuals(real, asked)
         new = span.beside(correct(left))  # in the span modes are the best ones
         errors[asked] = np.where(is_some, new.sizes, 0.0)
+        vibrates = abs(values[asked]) > _ROUNDING * problem.largest
+        errors[asked[is_some & is_large & vibrates & (asked < wanted)]] = 1.0  # would be refused
         converged = len(asked) == len(limits) and (errors < limits).all()
         if converged or len(span) == unknowns:
             return values[:wanted] + 0j, span.combined(shares[:, :wanted])

@@ -73,6 +73,11 @@ class FaceVibration:
         free.array[:] = np.concatenate([*own, plane])
         return free
 
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns that are free, of all ranks, and so of modes; collective."""
+        return round(self._free.sum())
+
     def _with_plane(self, bodies: PETSc.Mat, value: float | None) -> PETSc.Mat:
         if self._plane is None:
             return bodies

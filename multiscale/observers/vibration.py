@@ -21,7 +21,7 @@ from patchlaw.multiscale.models.measured_errors.faces import (
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, quantity
 from patchlaw.multiscale.results.history import History
-from patchlaw.support import Array
+from patchlaw.support import Array, located
 
 _DRAWN = 6
 """Modes that are drawn."""
@@ -75,7 +75,8 @@ class VibrationObserver(StepObserver):
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
         tangents = problem.forces.vibration_tangents(state, sliding)
-        found, shares = self._made.modes(tangents, section.modes)
+        with located(key="vibration.modes"):
+            found, shares = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
         # the stiffness of rough contacts goes with their pressure
         uncertain = sum(abs(one) for _, one in step.errors) / (step.force_N or 1.0)
@@ -128,6 +129,8 @@ class VibrationObserver(StepObserver):
             return body.as_quadratic()
 
         there = FaceVibration(face_on(face, other), self._made.mode, plane)
+        if there.unknowns < len(frequency):
+            return None  # linear elements of a coarse mesh have fewer modes
         found, _ = there.modes(tangents, len(frequency))
         factor = OF_QUADRATIC if quadratic else OF_LINEAR
         return np.asarray(factor * abs(found.frequencies[: len(frequency)] - frequency))

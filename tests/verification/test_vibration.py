@@ -21,7 +21,7 @@ from helpers.user_problems import (
 )  # fmt: skip
 from petsc4py import PETSc
 from scipy.io import mmread
-from scipy.linalg import eigh
+from scipy.linalg import eig, eigh
 from scipy.optimize import brentq
 
 from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
@@ -152,6 +152,29 @@ def test_no_mode_of_a_symmetric_cube_is_left_out():
     for count in (11, 23):
         found = natural_modes(*pair, count, bcs=bcs).frequencies
         assert found == pytest.approx(np.sqrt(squares[:count]) / (2.0 * np.pi), rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_slender_bodies_under_a_face_that_slides_vibrate_as_dense_matrices(seed):
+    """Their lowest squares are 1e-9 of the largest, and mere accuracy of shapes leaves 2e-5."""
+    draw = np.random.default_rng(seed)
+    lengths = (*draw.uniform(0.1, 0.3, 2), draw.uniform(7.0, 8.0))
+    mesh = box(cells=(2, 1, 2), lengths=lengths)
+    patch = PatchGrid(grid=(1, 1), lengths=lengths[:2])
+    more = {"mode": "patchwise", "patches": patch}
+    rough, space, tags = on_plane(mesh, Spring(draw.uniform(0.1, 10.0)), 2, **more)
+    stiffness, mass = matrices(space, 0.3)
+    sliding = tuple(draw.uniform(0.1, 1.0, 2))
+    contact = rough.stiffness_matrix(fem.Function(space), sliding=sliding)
+    stiffness.axpy(1.0, contact, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    found = natural_modes(stiffness, mass, 8, bcs=[clamped(space, tags)])
+    nodes = fem.locate_dofs_topological(space, 2, tags.find(BOTTOM))
+    free = np.setdiff1d(np.arange(stiffness.size[0]), (3 * nodes[:, None] + [0, 1, 2]).ravel())
+    whole = (one.convert("dense", PETSc.Mat()).getDenseArray() for one in (stiffness, mass))
+    squares = np.sort(eig(*(one[np.ix_(free, free)] for one in whole), right=False).real)
+    # rounding of the dense matrices is 1e-16 of squares 1e9 times as large
+    assert found.frequencies == pytest.approx(np.sqrt(squares[:8]) / (2.0 * np.pi), rel=1e-6)
+    assert found.residuals.max() < 1e-5
 
 
 def test_what_has_no_modes_is_refused():

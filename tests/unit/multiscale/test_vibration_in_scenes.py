@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from patchlaw.macro.contact.face_vibration import FaceVibration
 from patchlaw.multiscale import Run, Scene, make_setup, read_history
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
-from patchlaw.support import NotConverged
+from patchlaw.support import InputError, NotConverged
 
 E, NU, DENSITY, SIDE, HEIGHT = 4000.0, 0.3, 2e-9, 6.0, 4.0
 
@@ -39,6 +39,24 @@ def test_the_plan_counts_the_memory_of_modes():
     # Q2 has 3 × 3 × 9 nodes; vectors of 8 B for each of 15 modes at a time, 3 × 6 of them
     assert modes.shared > 3 * 81 * 8 * 15 * 18
     assert all(one.key != "vibration.modes" for one in plain.memory_requests())
+
+
+@pytest.mark.long
+def test_more_modes_than_unknowns_are_refused_by_their_key():
+    run = Run(scene(vibration={"modes": 500}))
+    with pytest.raises(InputError, match=r"vibration\.modes = 500: there are not as many modes"):
+        list(run.load_steps())
+    run.close()
+
+
+@pytest.mark.long
+def test_more_modes_than_linear_elements_have_come_without_the_elements_error():
+    output = {"check": "last", "figures": False, "report": False, "fields": False}
+    run = Run(scene(vibration={"modes": 20}, output=output))
+    (step,) = run.load_steps()
+    assert len(step.modes) == 20  # and 16 of linear elements
+    assert step.modes[0].element_error_Hz is None and step.first_frequency_error_Hz > 0.0
+    run.close()
 
 
 @pytest.fixture(scope="module")
