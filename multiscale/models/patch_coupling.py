@@ -281,8 +281,8 @@ class PatchCoupling(CellCoupling):
                 table = self.table = self._with_wear(table)
         if table.path is not None and self._pressed_evenly:
             moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
-            heat = rubs.coefficient / section.coefficient if rubs and section else 0.0
-            return FreePlaneContact(table, moved, heat)
+            coefficients = (one.coefficient if one and section else 0.0 for one in (section, rubs))
+            return FreePlaneContact(table, moved, *coefficients)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
