@@ -212,7 +212,7 @@ class FreePlaneContact(LawModel):
         super().__init__(table)
         new = WornLaws(depth=np.zeros(table.grid.count), laws=table.laws, slid=0.0, path=table.path)
         self._levels = [(one, PatchLaws(one.laws)) for one in (new, *table.worn)]
-        self._displacements, self.wears = displacements, bool(table.worn)
+        self._displacements, self.wears = displacements, wear > 0.0
         self._wear, self._friction = wear, friction
         self.past: tuple[_FreeLaws, float, LawPoint] | None = None
 

@@ -143,6 +143,8 @@ class PatchCoupling(CellCoupling):
         assert self.scene.wear is not None
         surface, path = self.parts.surface, self.parts.path
         per_way = self.scene.wear.coefficient * self._largest_force / surface.area
+        if per_way == 0.0:  # nothing is touched, so nothing wears
+            return []
         first = FIRST_DEPTH * roughness(surface).sq / per_way
         doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
         steps, before = [], None
@@ -192,7 +194,7 @@ class PatchCoupling(CellCoupling):
 
     def _worn_by(self, step: LoadStep) -> Array | None:
         """Return what has worn off the cells behind laws at a load step; None where nothing has."""
-        if not step.slid_mm:
+        if not (step.slid_mm and self.worn_depths):
             return None
         new = 0.0, np.zeros(()), None, None
         slid, depths, _, _ = zip(new, *self.worn_depths, strict=True)
