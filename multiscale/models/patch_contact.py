@@ -97,22 +97,33 @@ class PatchContact(LawModel):
 class _FreeLaws:
     """Laws under a plane without moment, of a surface that has slid by some distance.
 
-    They and the path of the plane are linear between two distances, at approaches equally far from
-    those of the largest load.
+    They and the path of the plane are linear in the worn volume between two distances, at
+    approaches equally far from those of the largest load. The volume is cubic in the distance, with
+    the rates of wear at both ends: at a held approach it grows by less and less.
 
     Args:
         levels: What the surface has become by these distances, the new one first.
         slid: The distance [mm].
+        rate: Returns the mean depth that wears off per distance slid; None where it is the same at
+            both distances.
 
     Attributes:
         worn: Depths that have worn off the patches, shape (N,) [mm].
         path: How the plane turns.
     """
 
-    def __init__(self, levels: Sequence[tuple[WornLaws, PatchLaws]], slid: float) -> None:
+    def __init__(
+        self,
+        levels: Sequence[tuple[WornLaws, PatchLaws]],
+        slid: float,
+        rate: Callable[[_FreeLaws], float] | None = None,
+    ) -> None:
         distances = [one.slid or 0.0 for one, _ in levels]
         place = float(np.interp(slid, distances, np.arange(len(distances))))
         below, share = int(place), place % 1.0
+        if share and rate is not None:
+            ends = [_FreeLaws(levels[one : one + 1], distances[one]) for one in (below, below + 1)]
+            share = _worn_share(share, float(np.diff(distances)[below]), ends, rate)
         parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
         self._parts, self.slid = parts[: 1 + (share > 0.0)], slid
         self.worn: Array = np.sum([part * one.depth for part, one, _ in self._parts], axis=0)
@@ -144,6 +155,21 @@ class _FreeLaws:
         return LawPoint._make(np.sum(fields, axis=0) for fields in zip(*points, strict=True))
 
 
+def _worn_share(
+    share: float, way: float, ends: Sequence[_FreeLaws], rate: Callable[[_FreeLaws], float]
+) -> float:
+    """Return the part of the volume worn between two distances by a part of the way [mm].
+
+    It is Hermite's cubic, with slopes within thrice the mean so that it rises (Fritsch & Carlson
+    1980, doi:10.1137/0717021).
+    """
+    wears = float(ends[1].worn.mean() - ends[0].worn.mean())
+    if not wears > 0.0:
+        return share
+    first, last = (min(rate(one) * way / wears, 3.0) for one in ends)
+    return share * (first + share * (3.0 - 2.0 * first - last + share * (first + last - 2.0)))
+
+
 def _end(level: WornLaws) -> float:
     """Return the largest approach that laws were made for [mm]."""
     assert level.path is not None, "laws of free planes have paths"
@@ -164,7 +190,8 @@ class FreePlaneContact(LawModel):
         table: The laws, with the path of the plane; those of a surface that wears have theirs too.
         displacements: Mean displacements of the patches by their pressures in the macro model.
             Collective.
-        heat: Energy that friction takes for the volume that wears off, μ/k [MPa].
+        wear: Coefficient of wear of a surface that slides [mm²/N].
+        friction: Coefficient of the friction whose energy is told of what slides.
 
     Raises:
         ValueError: When the laws have no path.
@@ -173,13 +200,20 @@ class FreePlaneContact(LawModel):
     wear_errors = (0.0,) * 6
     """Errors by the steps of wear beyond those of the surface, see `micro.wear.Worn`."""
 
-    def __init__(self, table: LawTable, displacements: Displacements, heat: float = 0.0) -> None:
+    def __init__(
+        self,
+        table: LawTable,
+        displacements: Displacements,
+        wear: float = 0.0,
+        friction: float = 0.0,
+    ) -> None:
         if table.path is None:
             raise ValueError("the laws were made under a plane of given tilt")
         super().__init__(table)
         new = WornLaws(depth=np.zeros(table.grid.count), laws=table.laws, slid=0.0, path=table.path)
         self._levels = [(one, PatchLaws(one.laws)) for one in (new, *table.worn)]
-        self._displacements, self._heat, self.wears = displacements, heat, bool(table.worn)
+        self._displacements, self.wears = displacements, wear > 0.0
+        self._wear, self._friction = wear, friction
         self.past: tuple[_FreeLaws, float, LawPoint] | None = None
 
     def press(self, control: Control) -> LoadStep:
@@ -188,8 +222,10 @@ class FreePlaneContact(LawModel):
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        laws, patches = _FreeLaws(self._levels, control.slid), self.table.grid
-        path, approach, evaluations = laws.path, control.approach, 0
+        patches, approach, evaluations = self.table.grid, control.approach, 0
+        rate = None if approach is None else lambda one: self._rate(one.along(approach))
+        laws = _FreeLaws(self._levels, control.slid, rate)
+        path = laws.path
         if approach is None:
             approach, evaluations = path.approach_under(
                 control.force or 0.0, lambda at: self._force(laws.along(at))
@@ -239,7 +275,7 @@ class FreePlaneContact(LawModel):
             "worn_volume_mm3": volume,
             "mean_worn_depth_mm": float(laws.worn.mean()),
             "worn_depth_mm": float(laws.worn.max()),
-        } | ({"dissipated_mJ": self._heat * volume} if self._heat else {})
+        } | ({"dissipated_mJ": self._friction / self._wear * volume} if self._friction else {})
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""
@@ -259,6 +295,9 @@ class FreePlaneContact(LawModel):
 
     def _force(self, point: LawPoint) -> float:
         return self.table.grid.area * float(point.pressure.sum())
+
+    def _rate(self, point: LawPoint) -> float:
+        return self._wear * float(point.pressure.mean())
 
 
 def equilibrium(

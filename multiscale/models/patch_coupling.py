@@ -143,6 +143,8 @@ class PatchCoupling(CellCoupling):
         assert self.scene.wear is not None
         surface, path = self.parts.surface, self.parts.path
         per_way = self.scene.wear.coefficient * self._largest_force / surface.area
+        if per_way == 0.0:  # nothing is touched, so nothing wears
+            return []
         first = FIRST_DEPTH * roughness(surface).sq / per_way
         doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
         steps, before = [], None
@@ -192,7 +194,7 @@ class PatchCoupling(CellCoupling):
 
     def _worn_by(self, step: LoadStep) -> Array | None:
         """Return what has worn off the cells behind laws at a load step; None where nothing has."""
-        if not step.slid_mm:
+        if not (step.slid_mm and self.worn_depths):
             return None
         new = 0.0, np.zeros(()), None, None
         slid, depths, _, _ = zip(new, *self.worn_depths, strict=True)
@@ -281,8 +283,8 @@ class PatchCoupling(CellCoupling):
                 table = self.table = self._with_wear(table)
         if table.path is not None and self._pressed_evenly:
             moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
-            heat = rubs.coefficient / section.coefficient if rubs and section else 0.0
-            return FreePlaneContact(table, moved, heat)
+            coefficients = (one.coefficient if one and section else 0.0 for one in (section, rubs))
+            return FreePlaneContact(table, moved, *coefficients)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem

@@ -213,6 +213,12 @@ def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(tmp_path
     assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-12)
 
 
+def test_patches_that_nothing_touches_do_not_wear():
+    load = {"approach": "0.01 um", "steps": 1, "tilt": "free", "sliding": [1.3e3]}
+    last = run(of_patches("consistent", load=load)).steps[-1]
+    assert last.force_N == last.worn_volume_mm3 == last.worn_depth_mm == 0.0
+
+
 def test_laws_of_patches_wear_and_yield_as_their_cells():
     """Laws are made of heights that are lower by both depths; faces know what has worn off."""
     quiet = {"figures": False, "report": False, "check": "none"}

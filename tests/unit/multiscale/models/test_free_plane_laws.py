@@ -1,5 +1,7 @@
 """Planes that turn as those of the rows of laws did."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthes
 from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale import LawTable, PatchLaw, consistent_laws
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.multiscale.models.patch_contact import FreePlaneContact
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact, _worn_share
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)
@@ -93,3 +95,23 @@ def test_laws_of_a_given_tilt_have_no_path():
     law = PatchLaw(rows=LawRows.none(), first_touch=1.0, initial_separation=1.0)
     with pytest.raises(ValueError, match="given tilt"):
         FreePlaneContact(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
+
+
+def test_what_wears_at_a_held_approach_is_cubic_in_the_distance():
+    """The load of a linear spring falls exponentially; a straight line is 0.09 off half-way."""
+
+    def share(part, first, last, rate):
+        ends = [SimpleNamespace(worn=np.array([x]), at=x) for x in (first, last)]
+        return _worn_share(part, 0.7, ends, lambda one: rate(one.at))
+
+    first, last = 0.4, 1.1
+    worn = [1.0 - np.exp(-first), 1.0 - np.exp(-last)]
+    for part in (0.0, 0.2, 0.5, 0.9, 1.0):
+        ends = [SimpleNamespace(worn=np.array([one])) for one in worn]
+        found = _worn_share(part, last - first, ends, lambda one: 1.0 - one.worn[0])
+        true = (1.0 - np.exp(-first - part * (last - first)) - worn[0]) / (worn[1] - worn[0])
+        assert found == pytest.approx(true, abs=1.2e-3)  # h⁴ f⁗ / 384
+    assert share(0.37, 0.4, 1.1, lambda _: 1.0) == pytest.approx(0.37, rel=1e-12)
+    assert share(0.37, 0.0, 0.0, lambda _: 1.0) == 0.37  # nothing wears
+    steep = [share(part, 0.4, 1.1, lambda at: 50.0 * (at < 1.0)) for part in (0.0, 0.3, 0.6, 1.0)]
+    assert (np.diff(steep) >= 0.0).all() and steep[-1] == pytest.approx(1.0)
