@@ -223,7 +223,8 @@ class History(Displayed):
         Args:
             *names: The tables, see `Column.table`, each with the number of the load step; by
                 default the curve and the solver's work.
-            most: Load steps that are shown; of more as many at equal distances.
+            most: Load steps that are shown; of more as many at equal distances, and a last row says
+                how many lie between.
         """
         names, chosen = names or ("curve", "solver"), spread(len(self.steps), most)
         shown = [self.steps[place] for place in chosen]
@@ -240,7 +241,10 @@ class History(Displayed):
         if self.reference is not None and "curve" in names:
             heading, cells = self.reference.cells
             texts[heading] = [cells[place] for place in chosen]
-        return list(texts), list(zip(*texts.values(), strict=True))
+        rows = list(zip(*texts.values(), strict=True))
+        if left := len(self.steps) - len(shown):
+            rows.append(("…", f"{left} more", *[""] * (len(texts) - 2)))
+        return list(texts), rows
 
     def zone_table(self) -> Table:
         """Return headings and rows of what the named regions of the face bear at the last step.
