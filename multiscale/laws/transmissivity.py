@@ -104,7 +104,7 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
 _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
-_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.5, 8e-3, 8
+_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 8e-3, 8
 """Rows are added on both sides of one whose T those beside it miss by more than this part of it,
 and of the error of the grid, or of T where that is less, until they are as near as this part of the
 separation at first touch, in so many passes at most. On six samples, isotropic and turned, 9 to 12
@@ -153,9 +153,10 @@ def sample_transmissivity(
     rows = _solved(samples, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
-        error = error_of_grid(known, *coarser)
-        off = _missed(separation, known, np.maximum(_OFF * known, _OF_GRID * error))
-        closes = ((known[:-1] > error[:-1]) & (known[1:] == 0.0)).any(axis=1)
+        error = np.minimum(error_of_grid(known, *coarser), known)
+        allowed = np.maximum(_OFF * known, _OF_GRID * error)
+        off = _missed(separation, known, allowed)
+        closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
         wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
         wide &= known[:-1].any(axis=1)
         if not wide.any():

@@ -138,6 +138,7 @@ def _ended_with(words):
             exec(compile(rest[0], "<words>", "exec"), {"__name__": "__main__"})
         else:
             sys.argv = words
+            sys.path.insert(0, str(Path(first).parent))  # as Python's command line does
             runpy.run_path(first, run_name="__main__")
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
