@@ -5,6 +5,7 @@ import pytest
 
 from patchlaw.multiscale import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.laws.worn_laws import RunningInLaws
 from patchlaw.support import InputError
 
 
@@ -110,3 +111,15 @@ def test_a_single_row_is_no_law():
     one = {name: np.zeros(1) for name in names} | {"contacts": np.ones(1, int)}
     with pytest.raises(InputError, match=r"a patch law needs no row .open patch. or at least two"):
         law_of(hertz, **one)
+
+
+def test_worn_laws_take_closures_beyond_their_end_by_a_thousandth():
+    laws = RunningInLaws([[law_of(hertz)], [law_of(hertz, end=8e-3)]], np.array([[0.0], [1e-3]]))
+    patch, depth = np.zeros(2, np.intp), np.array([0.0, 1e-3])
+    ends = np.array([9e-3, 8e-3])
+    found = laws.at(patch, ends * (1.0 + 5e-4), depth)
+    # along the tangent: less than the law itself by a term of second order
+    np.testing.assert_allclose(found.pressure, hertz(ends * (1.0 + 5e-4) - 1e-3), rtol=1e-6)
+    for place, value in ((0, "0.009018"), (1, "0.008016")):
+        with pytest.raises(InputError, match=f"{value}.*: closure beyond the end of the law of a"):
+            laws.at(patch[:1], ends[[place]] * (1.0 + 2e-3), depth[[place]])
