@@ -25,12 +25,12 @@ from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support import Array, Flags, shared
 
-_CELL, _TABLED = 1000.0, 400.0
+_CELL, _TABLED = 1000.0, 450.0
 """Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
 not converge. That took 400 on up to 192² cells and 220 on more; maps of up to 72² cells, with
 factors of bands, 6 MB at most. And what a table of leaks keeps for every cell of its samples [B]:
-pressures that further rows start from on all grids, and gaps on the finest: 250, 340 and 390 of 17,
-20 and 24 rows."""
+pressures that further rows start from on all grids, and gaps on the finest: 15 for a row, 20 to 30
+of which ten samples of 64² to 256² cells had."""
 
 
 def flow_memory(cells: int, tabled: int = 0) -> float:

@@ -53,7 +53,7 @@ def test_no_contact_of_a_table_is_solved_twice(monkeypatch):
 
 @pytest.mark.long
 def test_a_table_keeps_no_more_memory_than_plan_says(monkeypatch):
-    """Of 24 rows, which are many."""
+    """Of 30 rows, the most that ten samples had."""
     samples, make = [], transmissivity._Sample
 
     def kept(*given):
