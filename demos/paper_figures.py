@@ -17,7 +17,7 @@ from paper.page import Page
 
 from patchlaw.geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from patchlaw.micro import HertzContact
-from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
+from patchlaw.micro.closed_forms import factors_at, shape_factors
 from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,

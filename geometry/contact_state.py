@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Pair, RigidPlane
 from patchlaw.support import Array, Counts, Flags, Indices, InputError
-from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.readable import Displayed, Table
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth worn_depth "

@@ -24,7 +24,7 @@ from patchlaw.geometry.filters import levelled
 from patchlaw.geometry.interpolant import Interpolant, bordered, cell_centres
 from patchlaw.support import Array, Heights, Indices, InputError, Lengths, check_fields, checked
 from patchlaw.support.checks import LARGEST, frozen_array, is_level
-from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.readable import Displayed, Table
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -5,26 +5,26 @@ from .asperities.model import AsperityModel as AsperityModel
 from .boundary_elements.body_modes import BodyModes as BodyModes
 from .boundary_elements.body_modes import BodyStresses as BodyStresses
 from .boundary_elements.body_modes import TractionModes as TractionModes
+from .boundary_elements.body_modes import half_space_modes as half_space_modes
+from .boundary_elements.body_modes import (
+    half_space_stress_modes as half_space_stress_modes,
+)
 from .boundary_elements.body_modes import (
     half_space_traction_modes as half_space_traction_modes,
 )
+from .boundary_elements.body_modes import side_modes as side_modes
+from .boundary_elements.body_modes import side_stress_modes as side_stress_modes
 from .boundary_elements.finite_slopes import FiniteSlopes as FiniteSlopes
 from .boundary_elements.finite_slopes import SurfaceStress as SurfaceStress
 from .boundary_elements.finite_slopes import coarse_grid as coarse_grid
 from .boundary_elements.free_sides import FreeSides as FreeSides
 from .boundary_elements.rectangle_fields import RectangleFields as RectangleFields
-from .boundary_elements.rectangle_modes import half_space_modes as half_space_modes
-from .boundary_elements.rectangle_modes import (
-    half_space_stress_modes as half_space_stress_modes,
-)
-from .boundary_elements.rectangle_modes import side_modes as side_modes
-from .boundary_elements.rectangle_modes import side_stress_modes as side_stress_modes
 from .boundary_elements.side_cells import SideStresses as SideStresses
 from .boundary_elements.side_cells import side_stresses as side_stresses
 from .by_name import MODEL_NAMES as MODEL_NAMES
 from .by_name import micro_model as micro_model
-from .closed_forms.hertz import HertzContact as HertzContact
-from .closed_forms.love import influence_matrix as influence_matrix
+from .closed_forms import HertzContact as HertzContact
+from .closed_forms import influence_matrix as influence_matrix
 from .friction.friction_model import FrictionModel as FrictionModel
 from .half_space.model import HalfSpaceModel as HalfSpaceModel
 from .half_space.model import RigidPlane as RigidPlane

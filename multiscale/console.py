@@ -21,9 +21,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.machine import cores_statement, peak_memory
-from patchlaw.multiscale.readable import WHOLE, Caution, duration, quantity
 from patchlaw.support import PatchlawError, place_in
-from patchlaw.support.displayed import printable
+from patchlaw.support.readable import WHOLE, Caution, duration, printable, quantity
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support import PROGRAM, InputError, address_space, node_cores, physical_memory
 from patchlaw.support.packages import away
+from patchlaw.support.readable import ProgressObserver
 
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""

@@ -22,7 +22,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.sparse import csgraph, linalg
 
-from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.checks import Array, Flags, Indices
 from patchlaw.support.errors import NotConverged
 
 MOST_IMBALANCE = 1e-10

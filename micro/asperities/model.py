@@ -35,11 +35,12 @@ from patchlaw.micro.asperities.hertz_pairs import (
     Solution,
     SummitProblem,
     check_pairs,
+    patch_displacements,
+    patch_loads,
     solve,
 )
-from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_loads
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from patchlaw.micro.closed_forms.hertz import checked_modulus, shape_factors
+from patchlaw.micro.closed_forms import checked_modulus, shape_factors
 from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support import Array, InputError
 

@@ -1,8 +1,8 @@
 """The compliance of an elastic body as a sum of terms: pressures on its surface to displacements.
 
     term            for a grid of cells     for Legendre modes of the face   for patches
-    half-space      `half_space_grid`       `rectangle_modes`                `closed_forms.love`
-    free sides      `side_cells`            `rectangle_modes`                `free_sides`
+    half-space      `half_space_grid`       `body_modes`                     `closed_forms`
+    free sides      `side_cells`            `body_modes`                     `free_sides`
     finite body     `body_modes`            (given)                          `body_modes`
     finite slopes   `finite_slopes`         -                                -
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from patchlaw.micro.closed_forms.love import corner_integral
+from patchlaw.micro.closed_forms import corner_integral
 from patchlaw.support import BLOCK, Array, Indices, blocks, cores, in_threads, largest, on_rows
 
 Field = NDArray[Any]

@@ -42,10 +42,10 @@ import numpy as np
 
 from patchlaw.geometry import Material
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
-from patchlaw.micro.boundary_elements.body_modes import half_space_traction_modes
-from patchlaw.micro.boundary_elements.rectangle_modes import (
+from patchlaw.micro.boundary_elements.body_modes import (
     half_space_modes,
     half_space_stress_modes,
+    half_space_traction_modes,
 )
 from patchlaw.support import Array, Indices, Lengths, check_fields
 

@@ -36,7 +36,7 @@ from patchlaw.micro.boundary_elements.half_space_grid import (
     apart,
     fast_counts,
 )
-from patchlaw.micro.closed_forms.love import corner_parts
+from patchlaw.micro.closed_forms import corner_parts
 from patchlaw.support import Array, Indices, cores
 
 Pair = tuple[float, float]

@@ -20,8 +20,7 @@ import numpy as np
 
 from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
-from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term
-from patchlaw.multiscale.bodies.mesh import mesh_term
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term, mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support import Array, Indices

@@ -16,8 +16,7 @@ from typing import Any, NoReturn
 
 from patchlaw.multiscale.cli.interruption import ended_if_told, signals_raise
 from patchlaw.multiscale.laws import FORMATS
-from patchlaw.multiscale.runs import AGAINST, AT
-from patchlaw.multiscale.runs.output import VIEWS
+from patchlaw.multiscale.runs import AGAINST, AT, VIEWS
 from patchlaw.support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"

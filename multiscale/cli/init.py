@@ -17,14 +17,13 @@ from typing import Any
 from patchlaw.geometry import Material, Surface, roughness
 from patchlaw.multiscale import console
 from patchlaw.multiscale.machine import refuse_detached_processes
-from patchlaw.multiscale.readable import quantities, quantity
 from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene, changed, overridden
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support import InputError, check_file, on_root
-from patchlaw.support.displayed import printable
 from patchlaw.support.files import write_text
+from patchlaw.support.readable import printable, quantities, quantity
 
 CONTACT_AREA = 0.02
 """Contact area fraction that the default force makes, roughly."""

@@ -22,7 +22,6 @@ from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.output.figures import (
     RunFigures,
@@ -47,6 +46,7 @@ from patchlaw.support.errors import InputError, NotConverged, NotInstalled, Patc
 from patchlaw.support.files import OwnFiles
 from patchlaw.support.packages import optional_packages
 from patchlaw.support.parallel import on_root, on_root_alone, place_in
+from patchlaw.support.readable import ProgressObserver
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -14,8 +14,6 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import following
-from patchlaw.multiscale.readable import counted, duration, percent
-from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.runs import comparison as comparisons
 from patchlaw.multiscale.runs.cases import CaseResult, Journal
@@ -35,6 +33,8 @@ from patchlaw.multiscale.runs.sweep import (
 from patchlaw.multiscale.scene.scene import read_files
 from patchlaw.support import InputError, NotConverged, on_root, place_in
 from patchlaw.support.files import OwnFiles, remove
+from patchlaw.support.readable import counted, duration, percent
+from patchlaw.support.readable import number as readable_number
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "over_pressure.png", "diff.html")

@@ -10,7 +10,7 @@
 `of_patches` makes rows from contact problems of the whole surface, or of each patch alone,
 `of_samples` from periodic samples of a large face; `refinement` asks them for more rows where the
 error between rows is largest; `transmissivity` adds what leaks, by the flow through gaps of cells.
-Of exports `sampling` chooses rows with straight lines between, `law_module` is a Python module.
+`exported_law` chooses rows with straight lines between, and makes a Python module of a law.
 """
 
 FORMATS = ("csv", "4c", "abaqus", "calculix")

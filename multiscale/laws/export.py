@@ -29,18 +29,18 @@ import numpy as np
 from patchlaw.geometry import Friction, Regions
 from patchlaw.geometry.spring_bed import Coefficient, stiffness_ratios
 from patchlaw.multiscale.laws import FORMATS
-from patchlaw.multiscale.laws.law_module import law_modules
-from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.sampling import (
+from patchlaw.multiscale.laws.exported_law import (
     LEAST_PRESSURE,
     Conducts,
     LawSample,
+    law_modules,
     made_by,
     places,
     sample_law,
     zero_text,
 )
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.support import InputError, Limits, checked
 from patchlaw.support.files import OwnFiles, csv_text, write_text
 

@@ -23,11 +23,21 @@ from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
-from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support import Array, Indices, InputError, check_fields, check_file, checked, located
-from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.files import check_hdf5, hdf5_bytes, write_bytes
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.readable import (
+    Caution,
+    Detail,
+    Displayed,
+    Table,
+    column,
+    number,
+    of_columns,
+    percent,
+    quantities,
+    spread,
+)
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import Control, PatchGrid, stacked
 from patchlaw.micro import ContactState, MicroModel, Start, influence_matrix, press_along
-from patchlaw.micro.closed_forms.love import love_centre, love_mean
+from patchlaw.micro.closed_forms import love_centre, love_mean
 from patchlaw.multiscale.laws.interpolation import curves_from_touch, rising_curves
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, Refined, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support import Array, on_root_alone, shared
+from patchlaw.support.readable import ProgressObserver
 
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""

@@ -24,9 +24,9 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support import Array, InputError, shared
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
+from patchlaw.support.readable import ProgressObserver
 
 T = TypeVar("T", float, Array)
 MakeModel = Callable[[Surface], HalfSpaceModel]

@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
 from patchlaw.multiscale.laws.rows import LawRows, Transmissivity, Untouched
-from patchlaw.multiscale.readable import column, span
 from patchlaw.support import Array, Indices, InputError
-from patchlaw.support.displayed import Displayed, Table, of_columns, spread
+from patchlaw.support.readable import Displayed, Table, column, of_columns, span, spread
 
 _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""

@@ -14,7 +14,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.multiscale.readable import SCALED_UNITS, usual_unit, with_error, with_most
+from patchlaw.support.readable import SCALED_UNITS, usual_unit, with_error, with_most
 
 REQUIRED: Any = MISSING
 """Default of columns that every load step has."""

@@ -20,9 +20,8 @@ from patchlaw.multiscale.loading.column import (
     leak_columns,
     unknown_column,
 )
-from patchlaw.multiscale.readable import measured, number
 from patchlaw.support import Array, check_fields
-from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.readable import Displayed, Table, measured, number
 
 LOOSE = (
     "the plane, free to tilt, rests on cells or patches in one line, about which nothing holds it, "

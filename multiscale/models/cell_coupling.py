@@ -33,9 +33,9 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     response_of,
 )
 from patchlaw.multiscale.models.problem import Model, Problem
-from patchlaw.multiscale.readable import Caution, times
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
 from patchlaw.support import Array, NotConverged, on_root_alone
+from patchlaw.support.readable import Caution, times
 
 _COARSE = 32
 """Cells a side on which it is found whether friction is coupled where the scene does not say."""

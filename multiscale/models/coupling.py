@@ -24,7 +24,6 @@ from patchlaw.multiscale.machine import Clock, ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe, validity
 from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
 from patchlaw.multiscale.models.problem import Model
-from patchlaw.multiscale.readable import Detail, ProgressObserver, number, percent, quantity
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.scene.memory import (
@@ -37,6 +36,7 @@ from patchlaw.multiscale.scene.memory import (
 from patchlaw.multiscale.scene.parts import SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support import Array, located
+from patchlaw.support.readable import Detail, ProgressObserver, number, percent, quantity
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

@@ -10,9 +10,9 @@ import numpy as np
 from patchlaw.geometry import Material, roughness
 from patchlaw.multiscale.loading.load_history import LOADS, LoadHistory
 from patchlaw.multiscale.loading.path import BodyLoads
-from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import RegionSamples, most_waves
+from patchlaw.support.readable import number, quantities, quantity, times
 
 MESHED_CONTACTS = "none: contacts are meshed, and the keys of [micro] are not used"
 TOPICS = (

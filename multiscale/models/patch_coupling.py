@@ -25,8 +25,8 @@ from patchlaw.multiscale.models.cell_coupling import CellCoupling, as_worn
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
-from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.support import Array, on_root, on_root_alone
+from patchlaw.support.readable import ProgressObserver, times
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3

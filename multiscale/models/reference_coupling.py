@@ -28,11 +28,11 @@ from patchlaw.multiscale.models.reference_meshes import (
     plane_over_face,
     reference_meshes,
 )
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support import Array, located, on_root_alone
+from patchlaw.support.readable import ProgressObserver
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape

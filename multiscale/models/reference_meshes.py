@@ -24,10 +24,10 @@ from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.cell_contact import on_few_cells
-from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support import Array, InputError, located
+from patchlaw.support.readable import listed
 
 _BISECTED = 1.6
 """Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""

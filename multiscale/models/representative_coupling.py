@@ -16,7 +16,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, Friction, Surface, roughness
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.closed_forms.hertz import crowned_peak
+from patchlaw.micro.closed_forms import crowned_peak
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
@@ -39,10 +39,10 @@ from patchlaw.multiscale.models.measured_errors.faces import (
 )
 from patchlaw.multiscale.models.measured_errors.samples import SampleCells
 from patchlaw.multiscale.models.problem import Model
-from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth
 from patchlaw.support import Array, located, shared
+from patchlaw.support.readable import ProgressObserver, number, times
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from patchlaw.geometry import misalignment, roughness
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.schema import bare_quantities
 from patchlaw.multiscale.scene.surfaces import RegionSamples
+from patchlaw.support.readable import Caution, percent, quantities, quantity
 
 if TYPE_CHECKING:  # others than references do without
     from patchlaw.multiscale.models.reference_meshes import ReferenceMeshes

@@ -21,12 +21,15 @@ from patchlaw.micro.transport import (
     radiation_conductance,
     total_conductance,
 )
-from patchlaw.multiscale.laws.sampling import Conducts
+from patchlaw.multiscale.laws.exported_law import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import shear_error_notes
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
-from patchlaw.multiscale.readable import (
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.sections import ConductanceSection
+from patchlaw.support import Array, on_root
+from patchlaw.support.readable import (
     Caution,
     Detail,
     measured,
@@ -35,9 +38,6 @@ from patchlaw.multiscale.readable import (
     quantity,
     usual_unit,
 )
-from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.scene.sections import ConductanceSection
-from patchlaw.support import Array, on_root
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",

@@ -37,7 +37,9 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
-from patchlaw.multiscale.readable import (
+from patchlaw.support import Array, Indices, InputError, located, on_root_alone
+from patchlaw.support.network import network_flow
+from patchlaw.support.readable import (
     WHOLE,
     Caution,
     number,
@@ -47,8 +49,6 @@ from patchlaw.multiscale.readable import (
     usual_unit,
     with_most,
 )
-from patchlaw.support import Array, Indices, InputError, located, on_root_alone
-from patchlaw.support.network import network_flow
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_leak import LeakingFace

@@ -26,10 +26,10 @@ from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import error_notes
-from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantities, quantity
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.support import Array, InputError, NotConverged
+from patchlaw.support.readable import Caution, Detail, number, percent, quantities, quantity
 
 T = TypeVar("T")
 Columns = Mapping[str, Any]

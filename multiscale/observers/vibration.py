@@ -19,9 +19,9 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     OF_QUADRATIC,
 )
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
-from patchlaw.multiscale.readable import Caution, measured, number, quantity
 from patchlaw.multiscale.results.history import History
 from patchlaw.support import Array, located
+from patchlaw.support.readable import Caution, measured, number, quantity
 
 _DRAWN = 6
 """Modes that are drawn."""

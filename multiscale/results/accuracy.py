@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
-from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
 from patchlaw.support import Array, Flags, InputError
+from patchlaw.support.readable import Caution, measured, percent, usual_unit, with_error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

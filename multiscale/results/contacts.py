@@ -10,10 +10,22 @@ import numpy as np
 
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import column, counted, measured, number, usual, usual_unit
 from patchlaw.support import Array, Flags, InputError, check_fields, checked
-from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from patchlaw.support.packages import by_matplotlib
+from patchlaw.support.readable import (
+    Displayed,
+    Table,
+    column,
+    counted,
+    data_frame,
+    dataset,
+    measured,
+    number,
+    of_columns,
+    spread,
+    usual,
+    usual_unit,
+)
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""

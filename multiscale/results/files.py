@@ -23,11 +23,9 @@ from patchlaw.multiscale.loading.column import (
     modes_by_step,
 )
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState, of_older_run
-from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
 from patchlaw.support import Array, Counts, InputError, check_fields, checked, located
-from patchlaw.support.displayed import Displayed, Table, dataset
 from patchlaw.support.files import (
     OwnFiles,
     check_hdf5,
@@ -38,6 +36,7 @@ from patchlaw.support.files import (
     write_text,
 )
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.readable import Displayed, Table, dataset, number, times
 
 Files = Iterable[tuple[str, str | bytes]]
 """Names of files within a folder, and their contents."""

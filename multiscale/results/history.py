@@ -12,12 +12,21 @@ from numpy.typing import NDArray
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import CLEAR, COLUMNS, LOOSE, LoadStep
-from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.support import Array, Count, Flags, InputError, check_fields, checked
-from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from patchlaw.support.packages import by_matplotlib
+from patchlaw.support.readable import (
+    Caution,
+    Displayed,
+    Table,
+    column,
+    data_frame,
+    dataset,
+    of_columns,
+    span,
+    spread,
+)
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

@@ -25,10 +25,10 @@ import scipy
 from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.multiscale.loading.column import leak_rates
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
-from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
 from patchlaw.multiscale.results.history import History
 from patchlaw.support import Array, Flags, InputError
+from patchlaw.support.readable import number, usual_unit
 
 SAME = 1e-6
 """Relative difference below which loads are the same."""

@@ -15,3 +15,21 @@ AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "
 
 AT = ("pressure", "approach", "slid")
 """What two runs can have in common where they are compared."""
+
+VIEWS = {
+    "pressure": ("contact pressure", "MPa", "PRESSURES"),
+    "gap": ("gap", "mm", "GAPS"),
+    "plastic_depth": ("plastic depth", "mm", "DEPTHS"),
+    "worn_depth": ("worn depth", "mm", "DEPTHS"),
+    "body_pressure": ("pressure on the body", "MPa", "PRESSURES"),
+    "body_worn_depth": ("worn depth of the body", "mm", "DEPTHS"),
+    "fluid_pressure": ("fluid pressure", "MPa", "GAPS"),
+    "von_Mises": ("von Mises stress", "MPa", "STRESSES"),
+    "displacement": ("displacement", "mm", "viridis"),
+    "mode": ("natural mode", "", "viridis"),
+}
+"""What can be shown: its meaning, its unit, and its colours, of
+`multiscale.results.figures.style` or matplotlib."""
+
+PAGES = tuple(f"view_{name}.html" for name in VIEWS)
+"""Files of the pages."""

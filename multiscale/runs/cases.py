@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results_folder import locked
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene, changes, told
 from patchlaw.support import InputError, NotConverged, on_root, place_in, together
 from patchlaw.support.files import append, plain, read_bytes, unsealed, written
+from patchlaw.support.readable import Caution
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""

@@ -30,7 +30,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid, interval_overlaps
-from patchlaw.multiscale.readable import column, times
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs import AGAINST
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
@@ -46,8 +45,8 @@ from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support import Array, Comm, check_fields, checked, on_root
-from patchlaw.support.displayed import Displayed, Table, of_columns
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
+from patchlaw.support.readable import Displayed, Table, column, of_columns, times
 
 Curves: TypeAlias = Mapping[str, Array]
 """The load steps of a run, see `multiscale.runs.comparison`; empty of one without any."""

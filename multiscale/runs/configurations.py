@@ -18,13 +18,13 @@ from typing import Any, TypeAlias, cast
 
 from patchlaw.geometry import Surface, suggested_fine
 from patchlaw.micro import MODELS
-from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.loads import loads_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support import InputError
+from patchlaw.support.readable import times
 
 Grid: TypeAlias = tuple[int, int]
 """Heights or patches along x and y."""

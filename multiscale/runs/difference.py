@@ -13,16 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.multiscale.readable import (
-    SCALED_UNITS,
-    column,
-    number,
-    percent,
-    quantity,
-    shown_unit,
-    usual,
-    with_error,
-)
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.results.run_curves import (
     APPROACH,
@@ -45,8 +35,22 @@ from patchlaw.multiscale.results.run_curves import (
 from patchlaw.multiscale.runs import AT
 from patchlaw.multiscale.scene.schema import flat, scene_keys
 from patchlaw.support import Array, InputError, check_fields, checked
-from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.packages import by_matplotlib
+from patchlaw.support.readable import (
+    SCALED_UNITS,
+    Displayed,
+    Table,
+    column,
+    data_frame,
+    number,
+    of_columns,
+    percent,
+    quantity,
+    shown_unit,
+    spread,
+    usual,
+    with_error,
+)
 
 _MOST_CHANGES = 40
 """Keys of the scenes that are listed at most."""

@@ -35,13 +35,13 @@ from patchlaw.multiscale.models.problem import Problem
 from patchlaw.multiscale.models.reference_coupling import ReferenceCoupling
 from patchlaw.multiscale.models.representative_coupling import RepresentativeCoupling
 from patchlaw.multiscale.models.setup import trial_coupling
-from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import loads_on
 from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.support import on_root_alone
+from patchlaw.support.readable import ProgressObserver, times
 
 MOST_HEIGHTS = 2048
 """Heights or cells along a side of grids that are chosen, at most."""

@@ -24,7 +24,6 @@ from patchlaw.multiscale.observers.step_observers import (
     StepObserver,
     StiffnessObserver,
 )
-from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
@@ -32,6 +31,7 @@ from patchlaw.multiscale.runs.resolving import chosen_keys, resolve
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.support import Comm, NotConverged, checked, on_root
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.readable import ProgressObserver
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

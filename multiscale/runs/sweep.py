@@ -21,13 +21,20 @@ import numpy as np
 
 from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.readable import Caution, column
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
 from patchlaw.support import Array, Comm, Counts, InputError, checked, on_root, place_in, together
-from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.files import plain
 from patchlaw.support.packages import by_matplotlib
+from patchlaw.support.readable import (
+    Caution,
+    Displayed,
+    Table,
+    column,
+    data_frame,
+    of_columns,
+    spread,
+)
 
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""

@@ -31,12 +31,12 @@ from patchlaw.geometry.statistics import check_finite_slopes
 from patchlaw.geometry.surface import Zero
 from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
-from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support import Array, Flags, located, part_of
+from patchlaw.support.readable import times
 
 Cells = tuple[int, int, int]
 

@@ -34,7 +34,7 @@ from patchlaw.support import (
     part_of,
     reading,
 )
-from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.readable import Displayed, Table
 
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""

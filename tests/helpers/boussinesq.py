@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.geometry import Material, PatchGrid
-from patchlaw.micro.closed_forms.love import corner_integral
+from patchlaw.micro.closed_forms import corner_integral
 from patchlaw.support import InputError
 
 Array = NDArray[np.float64]

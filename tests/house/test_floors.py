@@ -23,8 +23,9 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays displayed errors parallel",
-        "checks files network packages quantities",
+        "errors readable",
+        "checks",
+        "files network packages parallel quantities",
         "arguments",
     ],
     "geometry": [
@@ -57,7 +58,6 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "readable",
         "machine",
         "laws loading",
         "console results",
@@ -71,7 +71,7 @@ FLOORS = {
 }
 # within a room of multiscale: what stands above its other modules, from the ground up
 UPPER = {
-    "laws": ["sampling", "law_module", "export"],
+    "laws": ["exported_law", "export"],
     "results": ["figures"],
     "models": [
         "problem",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.block_cases import block_of, interface_of
 
-from patchlaw.micro.closed_forms.love import love_mutual
+from patchlaw.micro.closed_forms import love_mutual
 
 
 @cache

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from patchlaw.micro import HertzContact
-from patchlaw.micro.closed_forms.hertz import circular_field, confocal_parameter, elliptic_field
+from patchlaw.micro.closed_forms import circular_field, confocal_parameter, elliptic_field
 
 E_STAR = 4000.0
 SHAPES = {"sphere": (0.2, 0.2), "ellipsoid": (0.5, 0.2), "slender": (3.0, 0.1)}

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
+from patchlaw.micro.closed_forms import factors_at, shape_factors
 
 
 def complete_integrals(beta):

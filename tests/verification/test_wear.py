@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.closed_forms.love import love_centre
+from patchlaw.micro.closed_forms import love_centre
 from tests.helpers.dense_contact import dense_contact, matrix_of
 
 RADIUS, MODULUS, FORCE, COEFFICIENT, SLID = 50.0, 1000.0, 0.02, 1e-6, 2e4

@@ -41,8 +41,8 @@ from patchlaw.geometry.contact_state import Start
 from patchlaw.micro import BodyModes, ContactState, FiniteSlopes, HalfSpaceModel, NormalStiffness
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
 from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
-from patchlaw.multiscale.readable import WHOLE, ProgressObserver, unobserved
 from patchlaw.support import Array, InputError
+from patchlaw.support.readable import WHOLE, ProgressObserver, unobserved
 
 MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the

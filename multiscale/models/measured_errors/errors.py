@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.support import Array
+from patchlaw.support.readable import Caution, percent, quantities, quantity
 
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}

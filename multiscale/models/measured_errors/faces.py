@@ -39,11 +39,11 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     interpolation_errors,
     mean_error,
 )
-from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support import Array, Indices
+from patchlaw.support.readable import Caution
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

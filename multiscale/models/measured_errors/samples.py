@@ -29,9 +29,9 @@ from patchlaw.multiscale.laws.refinement import LEAST_LOAD
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells, read
 from patchlaw.multiscale.models.measured_errors.edges import edge_width
 from patchlaw.multiscale.models.measured_errors.errors import stated
-from patchlaw.multiscale.readable import WHOLE, ProgressObserver, unobserved
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support import Array, NotConverged, shared
+from patchlaw.support.readable import WHOLE, ProgressObserver, unobserved
 
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""

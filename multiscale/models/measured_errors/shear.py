@@ -45,8 +45,8 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     shear_error_columns,
     worn_error_columns,
 )
-from patchlaw.multiscale.readable import WHOLE, ProgressObserver
 from patchlaw.support import Array, NotConverged
+from patchlaw.support.readable import WHOLE, ProgressObserver
 
 _HALF, _QUARTER, BY_COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over

@@ -10,10 +10,10 @@ from matplotlib.colors import LinearSegmentedColormap, ListedColormap
 from matplotlib.figure import Figure
 
 from patchlaw.geometry import PatchGrid, Surface
-from patchlaw.multiscale.readable import number, percent, shown_unit, usual, usual_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.surface import draw_surface
 from patchlaw.support import Array
+from patchlaw.support.readable import number, percent, shown_unit, usual, usual_unit
 
 YIELDED = "0.35"
 """Colour of cells that bear the hardness."""

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.loading.column import leak_rates
-from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.run_curves import (
     APPROACH,
@@ -24,6 +23,7 @@ from patchlaw.multiscale.results.run_curves import (
     over_pressure,
     pressure_between,
 )
+from patchlaw.support.readable import shown_unit
 
 
 @style.styled()

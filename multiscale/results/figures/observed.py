@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from patchlaw.micro.transport import GapFlow, gap_flows
-from patchlaw.multiscale.readable import percent, quantity, usual_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.support import Array
+from patchlaw.support.readable import percent, quantity, usual_unit
 
 _CONTACT = "0.5"
 """Grey of what is in contact."""

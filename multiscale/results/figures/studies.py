@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.curves import (
     draw_over_pressure,
@@ -19,6 +18,7 @@ from patchlaw.multiscale.results.figures.curves import (
     label_response,
 )
 from patchlaw.multiscale.results.run_curves import over_pressure
+from patchlaw.support.readable import shown_unit
 
 PALE = 0.4
 """Opacity of single cases, and of configurations that another one beats in time and error."""

@@ -22,8 +22,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale.readable import number, power_of_ten, shown_unit, usual_unit
 from patchlaw.support import Array
+from patchlaw.support.readable import number, power_of_ten, shown_unit, usual_unit
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
 PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"

@@ -16,10 +16,10 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, random_waves
 from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
-from patchlaw.micro.closed_forms.love import stresses_below
-from patchlaw.multiscale.readable import usual, usual_unit
+from patchlaw.micro.closed_forms import stresses_below
 from patchlaw.multiscale.results.figures import style
 from patchlaw.support import Array
+from patchlaw.support.readable import usual, usual_unit
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""

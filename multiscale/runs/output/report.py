@@ -16,9 +16,15 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import MEANINGS
-from patchlaw.multiscale.readable import (
+from patchlaw.multiscale.results.contacts import shown_contacts
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.results.run_curves import over_pressure
+from patchlaw.multiscale.runs.output.figures import CONTACT_OF_STEP, SURFACE_OF_ZONE
+from patchlaw.multiscale.runs.scene_run import Run
+from patchlaw.support.readable import (
     Caution,
     Detail,
+    Table,
     duration,
     measured,
     number,
@@ -26,15 +32,10 @@ from patchlaw.multiscale.readable import (
     quantities,
     quantity,
     shown_unit,
+    table_html,
     usual,
     with_error,
 )
-from patchlaw.multiscale.results.contacts import shown_contacts
-from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.results.run_curves import over_pressure
-from patchlaw.multiscale.runs.output.figures import CONTACT_OF_STEP, SURFACE_OF_ZONE
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.support.displayed import Table, table_html
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -27,7 +27,7 @@ from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
-from patchlaw.multiscale.runs.output import PAGES
+from patchlaw.multiscale.runs import PAGES
 from patchlaw.multiscale.runs.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.scene_run import Run

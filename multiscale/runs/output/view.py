@@ -13,13 +13,13 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import times, usual, usual_unit
 from patchlaw.multiscale.results.contacts import ContactHistory
 from patchlaw.multiscale.results.files import read_contact, read_fields, read_history, read_modes
-from patchlaw.multiscale.runs.output import PAGES, VIEWS
+from patchlaw.multiscale.runs import PAGES, VIEWS
 from patchlaw.support import Array, InputError, Limits, checked
 from patchlaw.support.files import OwnFiles, write_text
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.readable import times, usual, usual_unit
 
 _OF_CONTACT = ("pressure", "gap", "plastic_depth", "worn_depth")
 _OF_BODIES = {

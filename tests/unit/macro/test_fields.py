@@ -20,7 +20,7 @@ from patchlaw.macro import (
     write_rough_fields,
 )
 from patchlaw.macro.fields import cell_stresses
-from patchlaw.micro.closed_forms.love import stresses_below
+from patchlaw.micro.closed_forms import stresses_below
 
 h5py = pytest.importorskip("h5py")
 

@@ -9,8 +9,8 @@ import pytest
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
 from patchlaw.multiscale import LoadHistory, consistent_laws, console, isolated_laws
-from patchlaw.multiscale.readable import WHOLE
 from patchlaw.support import shared
+from patchlaw.support.readable import WHOLE
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5)

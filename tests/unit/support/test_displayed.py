@@ -17,7 +17,7 @@ from patchlaw.multiscale import (
 )
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.results.contacts import ContactRecord
-from patchlaw.support.displayed import Displayed, of_columns, spread, table_html, table_text
+from patchlaw.support.readable import Displayed, of_columns, spread, table_html, table_text
 
 
 class Shown(Displayed):

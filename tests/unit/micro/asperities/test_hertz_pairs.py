@@ -9,7 +9,7 @@ from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.micro import BodyModes, HertzContact
 from patchlaw.micro.asperities.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
-from patchlaw.micro.closed_forms.hertz import shape_factors
+from patchlaw.micro.closed_forms import shape_factors
 
 
 def interaction(asperities, circular):

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.micro.asperities.patch_sums import EllipticContacts, shares
+from patchlaw.micro.asperities.hertz_pairs import EllipticContacts, shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

@@ -7,7 +7,7 @@ from scipy.special import roots_jacobi
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HertzContact
-from patchlaw.micro.asperities.patch_sums import EllipticContacts, patch_displacements
+from patchlaw.micro.asperities.hertz_pairs import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))
 

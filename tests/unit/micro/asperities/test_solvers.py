@@ -15,7 +15,7 @@ from patchlaw.micro.asperities.hertz_pairs import (
     active_set,
     damped_step,
 )
-from patchlaw.micro.closed_forms.hertz import shape_factors
+from patchlaw.micro.closed_forms import shape_factors
 
 
 def problem(asperities, approach):

@@ -15,7 +15,7 @@ from patchlaw.micro.asperities.hertz_pairs import (
     check_pairs,
     solve,
 )
-from patchlaw.micro.closed_forms.hertz import shape_factors
+from patchlaw.micro.closed_forms import shape_factors
 
 
 @pytest.fixture

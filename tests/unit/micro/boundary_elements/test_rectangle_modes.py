@@ -9,7 +9,7 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means
 from patchlaw.micro import FreeSides, half_space_modes, influence_matrix, side_modes
 from patchlaw.micro.boundary_elements.side_cells import side_cells
-from patchlaw.micro.closed_forms.love import love_mean
+from patchlaw.micro.closed_forms import love_mean
 
 SHAPES = [(1.0, 1.0), (1.0, 2.5), (3.0, 0.2)]
 

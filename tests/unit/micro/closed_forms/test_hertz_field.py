@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro.closed_forms.hertz import NEAREST, confocal_parameter, elliptic_field, far_field
+from patchlaw.micro.closed_forms import NEAREST, confocal_parameter, elliptic_field, far_field
 
 BETA = np.array([1.0, 0.7, 0.1, 1e-4, 1e-9])
 

@@ -7,7 +7,7 @@ import pytest
 from helpers.boussinesq import love_integral
 from scipy.integrate import dblquad
 
-from patchlaw.micro.closed_forms.love import love_centre, love_mean, love_mutual
+from patchlaw.micro.closed_forms import love_centre, love_mean, love_mutual
 
 
 def integrated(x, y, a, b):

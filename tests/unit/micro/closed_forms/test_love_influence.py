@@ -6,7 +6,7 @@ import pytest
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import influence_matrix
-from patchlaw.micro.closed_forms.love import love_mean, mutual_influence
+from patchlaw.micro.closed_forms import love_mean, mutual_influence
 
 
 def _exact(dx, dy, a, b):

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from patchlaw import InputError
-from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
+from patchlaw.micro.closed_forms import factors_at, shape_factors
 
 
 def paper_force_factor(e):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro.closed_forms.love import stresses_below
+from patchlaw.micro.closed_forms import stresses_below
 
 NU = 0.3
 

@@ -22,7 +22,7 @@ from patchlaw.macro import (
 )
 from patchlaw.macro.compliance.surroundings import surroundings
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.bodies.mesh import mesh_key
+from patchlaw.multiscale.bodies.face_terms import mesh_key
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.support import InputError
 from patchlaw.support.files import fingerprint

@@ -8,7 +8,7 @@ from helpers.along import respond
 
 from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from patchlaw.micro import AsperityModel, micro_model
-from patchlaw.micro.closed_forms.love import love_centre, love_mean
+from patchlaw.micro.closed_forms import love_centre, love_mean
 from patchlaw.multiscale import isolated_laws
 from patchlaw.multiscale.laws.of_patches import IsolatedPatch
 from patchlaw.support import InputError

@@ -6,7 +6,7 @@ import pytest
 
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.observers.step_observers import BALANCE, energy_notes, missing_energy
-from patchlaw.multiscale.readable import Caution
+from patchlaw.support.readable import Caution
 
 YOUNG = 4000.0
 

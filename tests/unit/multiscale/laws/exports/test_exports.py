@@ -16,8 +16,8 @@ from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.multiscale import LawTable, PatchLaw, export_laws
 from patchlaw.multiscale.laws import FORMATS
 from patchlaw.multiscale.laws.export import remove_exports
+from patchlaw.multiscale.laws.exported_law import LEAST_PRESSURE, sample_law
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.laws.sampling import LEAST_PRESSURE, sample_law
 from patchlaw.support.files import LIST
 
 TOUCH = 1e-3

@@ -4,7 +4,7 @@ import pytest
 
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.readable import Caution
+from patchlaw.support.readable import Caution
 
 
 def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):

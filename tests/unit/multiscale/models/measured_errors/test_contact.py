@@ -18,10 +18,10 @@ from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
-from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support import NotConverged
+from patchlaw.support.readable import quantity, with_error
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):

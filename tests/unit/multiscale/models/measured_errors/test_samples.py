@@ -25,8 +25,8 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     interpolation_errors,
     mean_error,
 )
-from patchlaw.multiscale.readable import quantity
 from patchlaw.support import InputError, NotConverged
+from patchlaw.support.readable import quantity
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks

@@ -12,7 +12,7 @@ from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import shear
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import turning_points
-from patchlaw.multiscale.readable import WHOLE
+from patchlaw.support.readable import WHOLE
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
 SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}

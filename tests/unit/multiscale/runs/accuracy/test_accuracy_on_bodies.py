@@ -9,8 +9,8 @@ import pytest
 from helpers.box_msh import write_box
 
 from patchlaw.multiscale import Run, Scene, make_setup, resolve, run
-from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.runs import refining
+from patchlaw.support.readable import Caution
 
 CONSTANTS = {"young_modulus": 4037.0, "poisson_ratio": 0.21}
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.12, "seed": 3}

@@ -11,12 +11,12 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene, console, make_setup, resolve
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.runs import refining
 from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.output.results import provenance
 from patchlaw.multiscale.runs.resolving import SOLUTIONS_OF_LAWS, chosen_coupling
 from patchlaw.support import InputError
+from patchlaw.support.readable import Caution
 
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
 STATED = {

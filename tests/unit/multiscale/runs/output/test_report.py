@@ -13,10 +13,10 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.readable import percent, quantities
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.runs.output.report import _parted, citations, filled, report_html, results
 from patchlaw.multiscale.runs.output.results import provenance, write_results
+from patchlaw.support.readable import percent, quantities
 
 ROOT = Path(__file__).parents[5]
 PAPER = ROOT / "demos" / "scenes" / "paper.toml"

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.readable import (
+from patchlaw.support.quantities import parse_quantity
+from patchlaw.support.readable import (
     duration,
     measured,
     number,
@@ -16,7 +17,6 @@ from patchlaw.multiscale.readable import (
     usual_unit,
     with_error,
 )
-from patchlaw.support.quantities import parse_quantity
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
