@@ -161,7 +161,15 @@ Comm = Annotated[
 
 
 class _Refused(Exception):
-    """A value is not what its annotation says; the text goes on behind ``key = value:``."""
+    """A value is not what its annotation says.
+
+    Args:
+        what: The text that goes on behind ``key = value:``; or the annotation, which says it.
+    """
+
+    def __str__(self) -> str:
+        (what,) = self.args
+        return what if isinstance(what, str) else f"must be {_words(what)}"
 
 
 class _Beyond(_Refused):
@@ -307,7 +315,7 @@ def _instance(value: Any, hint: Any, finite: bool) -> Any:
     if holds is None and not isinstance(kind, type):
         return value
     if not (isinstance(value, kind) if holds is None else holds(value)):
-        raise _Refused(f"must be {_words(hint)}")
+        raise _Refused(hint)
     return value
 
 
@@ -337,46 +345,32 @@ def _any_of(value: Any, hint: Any, finite: bool) -> Any:
                 problems.append(refused.with_traceback(None))
     if len(problems) == 1:
         raise problems[0]
-    raise _Refused(f"must be {_words(hint)}")
+    raise _Refused(hint)
 
 
 def _choice(value: Any, hint: Any, finite: bool) -> Any:
     if not (isinstance(value, str | int) and value in get_args(hint)):
-        raise _Refused(f"must be {_words(hint)}")
+        raise _Refused(hint)
     return value
 
 
-def _plain(value: Any) -> Any:
-    """Return the number in an array without dimensions, and any other value as it is."""
-    single = isinstance(value, np.ndarray) and value.ndim == 0
-    return value.item() if single and not np.ma.is_masked(value) else value
+_SINGLE: dict[Any, Any] = {float: Real, int: Integral, bool: (bool, np.bool_)}
+"""What single values of a kind are taken from."""
 
 
-def _number(value: Any, hint: Any, finite: bool) -> Any:
-    value = _plain(value)
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise _Refused("must be a number")
+def _single(value: Any, hint: Any, finite: bool) -> Any:
+    """Take a number or a truth value, which an array without dimensions may hold."""
+    if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
+        value = value.item()
+    if not isinstance(value, _SINGLE[hint]) or (isinstance(value, bool) and hint is not bool):
+        raise _Refused(hint)
     try:
-        value = float(value)
+        value = hint(value)
     except OverflowError:
         value = math.inf
-    if finite and not math.isfinite(value):
+    if finite and hint is float and not math.isfinite(value):
         raise _Refused("must be a finite number")
     return value
-
-
-def _whole(value: Any, hint: Any, finite: bool) -> int:
-    value = _plain(value)
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise _Refused("must be a whole number")
-    return int(value)
-
-
-def _truth(value: Any, hint: Any, finite: bool) -> bool:
-    value = _plain(value)
-    if not isinstance(value, bool | np.bool_):
-        raise _Refused("must be True or False")
-    return bool(value)
 
 
 def _array(value: Any, hint: Any, finite: bool) -> Any:
@@ -398,11 +392,11 @@ def _tuple(value: Any, hint: Any, finite: bool) -> Any:
     endless = len(inner) == 2 and inner[1] is Ellipsis
     single = isinstance(value, np.ndarray) and value.ndim == 0
     if single or not isinstance(value, tuple | list | np.ndarray | range):
-        raise _Refused(f"must be {_words(hint)}")
+        raise _Refused(hint)
     if np.ma.is_masked(value):
         raise _Refused(f"must be {_words(hint)}, and none of them masked")
     if not endless and len(value) != len(inner):
-        raise _Refused(f"must be {_words(hint)}")
+        raise _Refused(hint)
     hints = inner[:1] * len(value) if endless else inner
     pairs = zip(value, hints, strict=True)
     passed = tuple(_item(one, each, finite, partial(_words, hint)) for one, each in pairs)
@@ -416,7 +410,7 @@ def _items(value: Any, hint: Any, finite: bool) -> Any:
     array = isinstance(value, np.ndarray) and value.ndim > 0
     kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
     if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
-        raise _Refused(f"must be {_words(hint)}")
+        raise _Refused(hint)
     if not inner or kind is abc.Iterable:
         return value
     passed = [_item(one, inner[0], finite, partial(_words, hint)) for one in value]
@@ -452,9 +446,7 @@ _TAKES: dict[Any, Callable[[Any, Any, bool], Any]] = {
     tuple: _tuple,
     **dict.fromkeys(_SEQUENCES, _items),
     **dict.fromkeys((abc.Mapping, abc.MutableMapping, dict), _mapping),
-    float: _number,
-    int: _whole,
-    bool: _truth,
+    **dict.fromkeys(_SINGLE, _single),
 }
 """Takes values of a kind of annotation, or refuses them; `_instance` does of all others."""
 _HOLDS: dict[Any, Callable[[Any], bool]] = {

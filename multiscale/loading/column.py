@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, MISSING, dataclass, field, fields, replace
+from functools import partial
 from itertools import count
 from types import MappingProxyType
 from typing import Any, overload
@@ -258,20 +259,16 @@ def leak_columns() -> Iterator[tuple[str, DerivedColumn]]:
         names = dict(_columns(way))
         for part, name in names.items():
             _, meaning, unit = _PARTS[part]
-            heading = (
-                f"{_HEADINGS[part]} {words if way != 'face' else ''}" if part in _HEADINGS else ""
-            )
-            error = names["error"] if part == "rate" else ""
-
-            def read(step: Any, way: str = way, part: str = part) -> Any:
-                leak = step.leak(way)
-                return None if leak is None else getattr(leak, part)
-
-            about = meaning.format(words), unit
-            shown: dict[str, Any] = {"error": error, "signed": part == "rate"}
+            rate = part == "rate"
+            shown: dict[str, Any] = {"signed": rate, "error": names["error"] if rate else ""}
             if part in _HEADINGS:
-                shown["heading"] = heading.strip()
-            yield name, DerivedColumn(read, *about, **shown)
+                shown["heading"] = f"{_HEADINGS[part]} {words if way != 'face' else ''}".strip()
+            read = partial(_of_leak, way, part)
+            yield name, DerivedColumn(read, meaning.format(words), unit, **shown)
+
+
+def _of_leak(way: str, part: str, step: Any) -> Any:
+    return getattr(step.leak(way), part, None)
 
 
 def leak_rates() -> Iterator[tuple[str, str]]:

@@ -193,7 +193,8 @@ class CellContact(Model):
         def solve() -> LoadStep:
             now = self._pressed(control)
             state, shear, products = now.solved, now.shear, 0
-            self._check_supports(control, state)
+            if any(self.held):
+                self._check_supports(control, state)
             if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear, heat=shear.heat), shear.products
             elif self._friction is not None and self.wears:
@@ -245,7 +246,8 @@ class CellContact(Model):
     def _pressed(self, control: Control) -> Past:
         """Solve the contact and its shear; the normal contact anew unless shear alone changes."""
         friction, past, normal = self._friction, self.past, replace(control, shear=None)
-        self._check_slid(control)
+        if control.slid:
+            self._check_slid(control)
         if friction is None or control.shear is None:
             state, slid = self._press(control, past.start)
             return past._replace(latest=state, control=normal, slid=slid, stiffness=None)
@@ -271,8 +273,6 @@ class CellContact(Model):
 
     def _check_slid(self, control: Control) -> None:
         """Refuse distances that nothing wears by, that fall, or beside a shear."""
-        if not control.slid:
-            return
         problem, allowed = "", ""
         if not self.wears:
             problem, allowed = (

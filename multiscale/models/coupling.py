@@ -204,19 +204,6 @@ class About:
         yield from range_notes(steps, table)
         yield from self.coupling.extensions
 
-    # --- for the record
-
-    def surface_record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the surface alone, by name."""
-        parts = self.parts
-        if parts.summits is None:
-            return {}
-        return {
-            "summits": parts.summits.count,
-            "summits_in_reach": int(parts.interfering_summits.sum()),
-            "border_maxima_in_reach": parts.interfering_border_maxima,
-        }
-
 
 class Coupling(ABC):
     """A scene on its way to load steps.

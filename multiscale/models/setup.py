@@ -182,7 +182,11 @@ def trial_coupling(
     scene: Scene, comm: Any, nodes: ClusterNodes, read: Callable[[Scene, Any], Meshes]
 ) -> Coupling:
     """Make the coupling of a scene whose open keys are as they are by default; see `make_setup`."""
-    _load_finite_elements(scene, comm)
+    meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
+    if comm is not None and (scene.has_body or meshed):
+        # PETSc starts with collective calls on all processes of the job: one rank alone must not
+        # import it; a process on its own does when it needs it
+        import patchlaw.macro.bodies  # noqa: F401
     module, _, name = _COUPLINGS[scene.kind].partition(".")
     with located(scene.file):
         first, counter = meshes = read(scene, comm)
@@ -191,14 +195,3 @@ def trial_coupling(
         kind = getattr(import_module(f"patchlaw.multiscale.models.{module}"), name)
         made: Coupling = kind(parts, comm, meshes, nodes)
         return made
-
-
-def _load_finite_elements(scene: Scene, comm: Any) -> None:
-    """Import the finite elements on all ranks where a scene may need them.
-
-    PETSc starts with collective calls on all processes of the job, so that one rank alone must not
-    import it. A process on its own imports them when it needs them.
-    """
-    meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
-    if comm is not None and (scene.has_body or meshed):
-        import patchlaw.macro.bodies  # noqa: F401

@@ -5,8 +5,9 @@ What a section says of itself alone is checked where it is declared.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
+from functools import partial
 from itertools import chain
 from math import hypot
 
@@ -48,16 +49,22 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
     Raises:
         InputError: With the first reason.
     """
-    before = (_bodies, _body_loads, _surfaces, _couplings)
-    after = (_cells, _hardness, _leak, _conductance, _friction, _shear)
-    problems = chain(
-        *(rule(scene) for rule in before),
-        _samples(scene, of_coupling),
-        *(rule(scene) for rule in after),
-        _wear(scene),
-        _vibration(scene),
-    )
-    for key, problem, allowed in problems:
+    rules: dict[Callable[[SceneSections], Iterator[Refusal]], bool] = {
+        _bodies: True,
+        _body_loads: True,
+        _surfaces: True,
+        _couplings: True,
+        partial(_samples, of_coupling=of_coupling): scene.law.representative,
+        _cells: scene.micro.cells is not None,
+        _hardness: bool(scene.hardness_key),
+        _lacking: True,
+        _leak: scene.leak is not None,
+        _conductance: scene.conductance is not None,
+        _friction: scene.friction is not None,
+        _wear: scene.wear is not None,
+        _vibration: scene.vibration is not None,
+    }
+    for key, problem, allowed in chain(*(rule(scene) for rule, acts in rules.items() if acts)):
         raise InputError(problem, key=key, allowed=allowed or None)
 
 
@@ -150,8 +157,6 @@ def _couplings(scene: SceneSections) -> Iterator[Refusal]:
 def _samples(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]:
     """Yield what a law of a periodic sample has no use for."""
     law, goes = scene.law, f"does not go with {_SAMPLES}"
-    if not law.representative:
-        return
     values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
     stated = set(of_coupling)
     if stated >= {key for key, value in values.items() if value is not None}:  # written whole
@@ -176,8 +181,6 @@ def _samples(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refus
 
 def _cells(scene: SceneSections) -> Iterator[Refusal]:
     """Yield cells of contact problems where there are none."""
-    if scene.micro.cells is None:
-        return
     without = {
         f"micro.model = '{scene.micro.model}'": scene.micro.model != "half-space",
         "coupling.kind = 'reference'": scene.kind == "reference",
@@ -191,19 +194,34 @@ def _cells(scene: SceneSections) -> Iterator[Refusal]:
 
 def _hardness(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what micro models, and patch laws that stand for them, do not know of yielding."""
-    if not (key := scene.hardness_key):
-        return
-    yield from _summits(scene, key, "has no cells to yield")
+    yield from _summits(scene, scene.hardness_key, "has no cells to yield")
     if scene.loading.unloads and scene.by_laws:
-        yield key, *TURNS_BACK
+        yield scene.hardness_key, *TURNS_BACK
+
+
+def _lacking(scene: SceneSections) -> Iterator[Refusal]:
+    """Yield what has no effect without a section that is not there."""
+    loading, coefficient = scene.loading, "[wear] with a coefficient"
+    rubs = (n for n, region in enumerate(scene.law.regions) if region.friction is not None)
+    wears = any(region.wear is not None for region in scene.law.regions)
+    if scene.leak is None and scene.law.axes is not None:
+        yield "law.axes", "has no effect without a leak", f"[leak] beside it; or {_OUT}"
+    if scene.friction is None:
+        allowed = "[friction] with a coefficient, which holds on all other regions"
+        yield from ((f"law.regions.{n}.friction", "needs [friction]", allowed) for n in rubs)
+        if loading.shear_key:
+            key = "load.stage" if loading.stage else f"load.{loading.shear_key}"
+            yield key, "needs friction", "friction.coefficient, as in 0.3"
+    if scene.wear is None and wears:
+        yield "law.regions", "'wear' needs the section [wear]", coefficient
+    if scene.wear is None and loading.slides:
+        yield "load.sliding", "changes nothing without wear", coefficient
 
 
 def _leak(scene: SceneSections) -> Iterator[Refusal]:
     """Yield gaps that are not known, and edges of faces that there are none of."""
-    if (leak := scene.leak) is None:
-        if scene.law.axes is not None:
-            yield "law.axes", "has no effect without a leak", f"[leak] beside it; or {_OUT}"
-        return
+    leak = scene.leak
+    assert leak is not None, "a rule of this section"
     if leak.between_edges and (scene.body is None or not scene.law.representative):
         problem = f"needs {_SAMPLES} on a [body], whose face has edges"
         yield "leak.inlet", problem, "leave out both edges"
@@ -215,8 +233,6 @@ def _leak(scene: SceneSections) -> Iterator[Refusal]:
 
 def _conductance(scene: SceneSections) -> Iterator[Refusal]:
     """Yield contacts whose stiffness says nothing of what they conduct."""
-    if scene.conductance is None:
-        return
     if (key := scene.hardness_key) and scene.by_laws:
         yield (
             "conductance",
@@ -231,12 +247,8 @@ def _conductance(scene: SceneSections) -> Iterator[Refusal]:
 
 def _friction(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what has no friction, friction without effect, and loads that it does not bear."""
-    if (friction := scene.friction) is None:
-        for number, region in enumerate(scene.law.regions):
-            if region.friction is not None:
-                allowed = "[friction] with a coefficient, which holds on all other regions"
-                yield f"law.regions.{number}.friction", "needs [friction]", allowed
-        return
+    friction = scene.friction
+    assert friction is not None, "a rule of this section"
     if scene.rubs_on_mesh:
         if friction.coupled:
             problem = (
@@ -273,22 +285,8 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
             yield "load.shear_force", problem, f"pairs shorter than {most:.6g} N; or load.shear"
 
 
-def _shear(scene: SceneSections) -> Iterator[Refusal]:
-    """Yield shear without friction."""
-    loading = scene.loading
-    if loading.shear_key and scene.friction is None:
-        place = "load.stage" if loading.stage else f"load.{loading.shear_key}"
-        yield place, "needs friction", "friction.coefficient, as in 0.3"
-
-
 def _wear(scene: SceneSections) -> Iterator[Refusal]:
-    """Yield wear where nothing slides, sliding where nothing wears, and what does not wear."""
-    if scene.wear is None:
-        if any(one.wear is not None for one in scene.law.regions):
-            yield "law.regions", "'wear' needs the section [wear]", "[wear] with a coefficient"
-        if scene.loading.slides:
-            yield "load.sliding", "changes nothing without wear", "[wear] with a coefficient"
-        return
+    """Yield wear where nothing slides, and what does not wear."""
     slides, slips = scene.loading.slides, scene.friction and scene.loading.shear_key
     if not (slides or slips):
         allowed = "load.sliding = '100 m'; or [friction] with load.shear or load.shear_force"
@@ -325,8 +323,8 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
 
 def _vibration(scene: SceneSections) -> Iterator[Refusal]:
     """Yield couplings without a body that has mass, and directions in which nothing rubs."""
-    if (section := scene.vibration) is None:
-        return
+    section = scene.vibration
+    assert section is not None, "a rule of this section"
     if not scene.by_laws:
         yield (
             "vibration",

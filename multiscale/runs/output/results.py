@@ -26,6 +26,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
 from patchlaw.multiscale.runs import PAGES
 from patchlaw.multiscale.runs.output.figures import OF_REPORT, RunFigures
@@ -151,7 +152,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
         "unknowns": coupling.unknowns,
-        "reference": _reference(run),
+        "reference": _reference(run, history.reference) if history.reference else None,
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
@@ -174,7 +175,11 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
 
 def _surface(coupling: Coupling) -> dict[str, Any]:
     """Return what provenance says of the surface; the SHA-256 is that of all samples."""
-    parts, surface = coupling.parts, coupling.parts.surface
+    parts, surface, summits = coupling.parts, coupling.parts.surface, dict[str, int]()
+    if parts.summits is not None:
+        summits["summits"] = parts.summits.count
+        summits["summits_in_reach"] = int(parts.interfering_summits.sum())
+        summits["border_maxima_in_reach"] = parts.interfering_border_maxima
     samples = () if parts.regions is None else parts.rough_surfaces
     return {
         "source": surface.source,
@@ -183,7 +188,7 @@ def _surface(coupling: Coupling) -> dict[str, Any]:
         "heights_sha256": fingerprint([one.heights for one in (surface, *samples)]),
         "highest_mm": surface.highest,
         "zero_below_highest_mm": parts.zero,
-        **coupling.about.surface_record(),
+        **summits,
     }
 
 
@@ -201,11 +206,8 @@ def _body(face: BodyFacts) -> dict[str, Any]:
     }
 
 
-def _reference(run: Run) -> dict[str, Any] | None:
-    """Return the meshes of a reference and its errors; None with other couplings."""
-    record = run.history().reference
-    if record is None:
-        return None
+def _reference(run: Run, record: ReferenceRecord) -> dict[str, Any]:
+    """Return the meshes of a reference and its errors."""
     return {
         **run.coupling.record(),
         "sizes_mm": record.sizes.tolist(),
@@ -219,8 +221,8 @@ def _reference(run: Run) -> dict[str, Any] | None:
 
 def library_versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that took part."""
-    loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
-    found = {name: _version(name, module) for name, module in loaded.items()}
+    loaded = (name for name in LIBRARIES if name in sys.modules)
+    found = {name: _version(name, sys.modules[name]) for name in loaded}
     return {"python": platform.python_version(), **found}
 
 
