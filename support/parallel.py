@@ -369,7 +369,7 @@ def shared(
         Collective.
     """
     rank, size = place_in(comm)
-    parts = distributed(count, size, costs)
+    parts = distributed(count, size, costs) if size > 1 or costs is not None else [range(count)]
 
     def work_off() -> list[T]:
         results = []

@@ -91,6 +91,9 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                 console.open_page(comm, files)
 
 
+_NOTHING = "nothing to resume in {}: begins with the first load step"
+
+
 def _earlier(
     choice: argparse.Namespace, folder: Path, scene: Scene
 ) -> tuple[Checkpoint | None, str]:
@@ -98,6 +101,8 @@ def _earlier(
 
     Nothing that another scene left there is replaced unless the user says so.
     """
+    if not any(folder.iterdir()):
+        return None, _NOTHING.format(folder) * choice.resume
     anew = choice.overwrite and not choice.resume
     OwnFiles(folder).refuse_others(FILES, read_files(scene), overwrite=anew)
     kept = None if anew else find_checkpoint(folder, scene)
@@ -108,7 +113,7 @@ def _earlier(
         refuse_other_results(folder, identity(scene))
         refuse_other_kind(folder, cases=False)
     if choice.resume:
-        return None, f"nothing to resume in {folder}: begins with the first load step"
+        return None, _NOTHING.format(folder)
     interrupted = (folder / FILE_NAME).exists()
     return None, f"replaces the interrupted run in {folder}" * interrupted
 

@@ -147,7 +147,7 @@ class CellCoupling(Coupling):
 
     def _make_model(self) -> Model:
         made = self.contact_of(self.model_on_body())
-        if self.scene.has_body:
+        if self.scene.has_body and any(self._meshes):  # whose supports may lie beside the face
             made.held = self.bodies.terms(side_term=False).held
         return made
 

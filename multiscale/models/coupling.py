@@ -234,7 +234,7 @@ class Coupling(ABC):
         self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
     ) -> None:
         self.parts, self.comm = parts, comm
-        self._meshes = meshes if parts.samples else _placed(parts, meshes)
+        self._meshes = _placed(parts, meshes) if any(meshes) and not parts.samples else meshes
         self.clock = Clock()
         self.table: LawTable | None = None
         self.start: Any = None

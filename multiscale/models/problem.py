@@ -413,25 +413,23 @@ class Problem:
 
     def _within_limit(self, target: float) -> LoadStep | None:
         """Press to a load step; return None when the force would change by too much."""
-        divisible = target - self.position.time > _SMALLEST
-        force = self._control(target).force
-        if divisible and force is not None and self._exceeds_limit(force):
-            return None
-        past = getattr(self._model, "past", None)
-        step = self._reached(target)
-        if divisible and self._exceeds_limit(step.force_N):
-            if past is not None:
-                self._model.past = past
-            return None
-        return step
+        limit, last = self._force_change, self.position.force
+        if limit is None or last == 0.0 or target - self.position.time <= _SMALLEST:
+            return self._reached(target)
 
-    def _exceeds_limit(self, force: float) -> bool:
-        limit = self._force_change
-        last, largest = self.position.force, self.position.largest
-        if limit is None or last == 0.0:
-            return False
-        # halved steps of a force may meet the limit exactly, up to rounding
-        return abs(force - last) > limit * max(largest, force) * (1.0 + 1e-9)
+        def exceeds(force: float) -> bool:
+            # halved steps of a force may meet the limit exactly, up to rounding
+            return abs(force - last) > limit * max(self.position.largest, force) * (1.0 + 1e-9)
+
+        force, past = self._control(target).force, getattr(self._model, "past", None)
+        if force is not None and exceeds(force):
+            return None
+        step = self._reached(target)
+        if not exceeds(step.force_N):
+            return step
+        if past is not None:
+            self._model.past = past
+        return None
 
     def _reached(self, target: float) -> LoadStep:
         """Press to a load step, through smaller ones where the whole one fails."""
