@@ -22,7 +22,7 @@ from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
 from patchlaw.micro.half_space.model import HalfSpaceModel
 from patchlaw.micro.half_space.read_off import rates_of_pressures
-from patchlaw.support import NotConverged
+from patchlaw.support import Array, NotConverged
 
 TOLERANCE = 1e-6
 """Change of the displacements across by a further pass, over the largest displacement, at least;
@@ -81,11 +81,7 @@ def press_coupled(
         if cross is not None and shear.closed.any():
             across = cross.across(shear.traction)
         off = friction.worn_by(shear.heat - heat)  # in the step
-        seen = sum_of(state.worn_depth, None if worn is None else -worn)
-        unseen = np.abs(off - (0.0 if seen is None else seen))
-        apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), unseen)
-        moved = float(np.abs(state.displacement).max())  # type: ignore[arg-type]
-        change = float(apart.max()) / max(moved, float(np.finfo(float).tiny))
+        change = _disagreement(state, np.where(shear.closed, across - displaced, 0.0), off, worn)
         if change <= max(TOLERANCE, friction.tolerance):
             state = replace(state, worn_depth=sum_of(worn, off) if friction.wear else worn)
             return replace(state, iterations=products - shear.products), shear
@@ -103,6 +99,21 @@ def press_coupled(
         + ", or set friction.coupled = false" * friction.coupled
         + ", or a smaller coefficient of wear" * bool(friction.wear),
     )
+
+
+def _disagreement(state: ContactState, across: Array, off: Array, worn: Array | None) -> float:
+    """Return what a further pass changes, over the largest displacement.
+
+    Args:
+        state: The contact, of what had worn off by the pass before.
+        across: Change of the displacements across by tractions, shape (nx, ny) [mm].
+        off: What the tractions wear off in the step, likewise.
+        worn: What had worn off before it, likewise; None for nothing.
+    """
+    seen = sum_of(state.worn_depth, None if worn is None else -worn)
+    unseen = np.abs(off - (0.0 if seen is None else seen))
+    moved = float(np.abs(state.displacement).max())  # type: ignore[arg-type]
+    return float(np.maximum(np.abs(across), unseen).max()) / max(moved, float(np.finfo(float).tiny))
 
 
 def coupled_stiffness(

@@ -70,29 +70,37 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
                 gc.enable()
             share_petsc_options(comm)
             command(choice, _start_petsc(options, petsc_words), comm)
-    except SystemExit:  # of rich, when nobody reads standard output any more
-        return _end_all(comm, NotWritten.exit_code)
     except PatchlawError as error:
         together = _all_arrive(meeting)
         console.complain(comm if together else None, error)
         return error.exit_code if together else _end_all(comm, error.exit_code)
-    except KeyboardInterrupt as error:
-        if comm is None:
-            raise
-        return _end_all(comm, getattr(error, "exit_code", 1))
-    except MemoryError as error:
-        console.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
-        return _end_all(comm, OutOfMemory.exit_code)
-    except Exception as error:
-        if comm is None and isinstance(error, OSError) and error.errno in _FULL:
-            raise  # standard output takes no more
-        if comm is not None:
-            # several ranks may meet the same error: the first ends the others before they print it
-            time.sleep(min(comm.rank, _LONGEST_WAIT))
-        traceback.print_exc()
-        return _end_all(comm, 1)
+    except BaseException as error:
+        return _end_all(comm, _told(error, comm))
     _all_arrive(meeting)
     return 0
+
+
+def _told(error: BaseException, comm: Any) -> int:
+    """Say what ended a command on this rank alone, and return its exit code.
+
+    Raises:
+        BaseException: The error itself, where a process on its own has it handled further up.
+    """
+    if isinstance(error, SystemExit):  # of rich, when nobody reads standard output any more
+        return NotWritten.exit_code
+    if isinstance(error, MemoryError):
+        console.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
+        return OutOfMemory.exit_code
+    output_full = isinstance(error, OSError) and error.errno in _FULL
+    if comm is None and (output_full or not isinstance(error, Exception)):
+        raise error
+    if isinstance(error, KeyboardInterrupt):
+        return int(getattr(error, "exit_code", 1))
+    if comm is not None:
+        # several ranks may meet the same error: the first ends the others before they print it
+        time.sleep(min(comm.rank, _LONGEST_WAIT))
+    traceback.print_exception(error)
+    return 1
 
 
 def scene_and_folder(

@@ -306,6 +306,8 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
         steps: The load steps.
         table: The patch laws; None where the micro model is solved itself.
     """
+    if table is None and not any(step.warnings for step in steps):
+        return
     of_tilt = LOOSE, CLEAR
     for text in of_tilt:
         if loose := [step.step for step in steps if text in step.warnings]:
