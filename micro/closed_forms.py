@@ -57,7 +57,7 @@ from numpy.typing import ArrayLike
 from scipy import fft
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.face_frame import gauss_rule
 from patchlaw.support import Array, InputError
 
 NEAREST = 30.0

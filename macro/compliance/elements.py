@@ -22,7 +22,7 @@ from numpy.polynomial import legendre
 from scipy import linalg
 
 from patchlaw.geometry import Material
-from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
+from patchlaw.geometry.face_frame import gauss_rule, mode_values
 from patchlaw.support import Array, Indices, NotConverged
 
 _MORE = 6

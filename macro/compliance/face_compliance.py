@@ -194,7 +194,7 @@ def _products(along_x: Array, along_y: Array) -> Array:
 class FaceCompliance:
     """Displacements and stresses of a block's top by pressures on it, in Legendre modes φ.
 
-    Mode k K + l is P̂_k(x) P̂_l(y) (`geometry.legendre_modes`). A pressure p with the moments
+    Mode k K + l is P̂_k(x) P̂_l(y) (`geometry.face_frame`). A pressure p with the moments
     b_n = ∫ p φ_n dA displaces the top by Σ φ_m C_mn b_n.
 
     Args:

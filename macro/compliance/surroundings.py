@@ -16,8 +16,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from patchlaw.geometry import Material, PatchGrid
-from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.face_frame import FaceFrame, mode_values
 from patchlaw.macro import compat
 from patchlaw.macro.contact.loaded_face import LoadedFace
 from patchlaw.macro.elastic_body import ElasticBody

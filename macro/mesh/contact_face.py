@@ -10,8 +10,7 @@ import numpy as np
 from dolfinx import fem
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.face_frame import UPWARD, FaceFrame
-from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.face_frame import UPWARD, FaceFrame, gauss_rule
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.block import TOP, BlockMesh
 from patchlaw.macro.mesh.facet_parts import (

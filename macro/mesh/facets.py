@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.face_frame import gauss_rule
 from patchlaw.macro import compat
 from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals
 

@@ -71,7 +71,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.face_frame import gauss_rule
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.micro.closed_forms import (
     ShapeFactors,

@@ -16,7 +16,7 @@ and across them of values at nodes of the distance from the side.
 What a finite body adds to the half-space is smooth.
 Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n. They displace by Σ φ_m D_mn b_n,
 and add the stresses Σ φ_m S_mn b_n in the surface. Modes are products of Legendre modes along x and
-y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes: mode
+y (`geometry.face_frame`), so that all evaluations are thin products along the axes: mode
 k K + l varies as mode k along x and l along y. Matrices have the shape (K², K²). Those of tractions
 in all directions, along x, y and into the body, have the shape (3, 3, K², K²).
 
@@ -34,7 +34,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import (
+from patchlaw.geometry.face_frame import (
     gauss_rule,
     mode_means,
     mode_slopes,

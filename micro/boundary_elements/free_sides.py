@@ -50,7 +50,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.face_frame import gauss_rule
 from patchlaw.support import Array, Indices, InputError
 
 _LOG_STEP = 0.08

@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 
 from patchlaw.geometry import Material
-from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
+from patchlaw.geometry.face_frame import gauss_rule, mode_values
 from patchlaw.micro.boundary_elements.body_modes import (
     half_space_modes,
     half_space_stress_modes,

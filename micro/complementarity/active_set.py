@@ -24,8 +24,11 @@ import numpy as np
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
 from patchlaw.micro.boundary_elements.inverse import ContactCells
-from patchlaw.micro.complementarity.admissible_start import admissible_start
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.cell_problem import (
+    CellProblem,
+    ContactPressures,
+    admissible_start,
+)
 from patchlaw.support import Array, Flags, Indices, NotConverged, largest, on_rows
 
 _TRUSTING_STEPS = 20

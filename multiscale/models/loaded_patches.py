@@ -12,8 +12,7 @@ import scipy
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.rigid_plane import PlaneLevers, way_of_approach
-from patchlaw.micro.complementarity.admissible_start import clearance
-from patchlaw.micro.complementarity.cell_problem import Motions
+from patchlaw.micro.complementarity.cell_problem import Motions, clearance
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 from patchlaw.multiscale.laws.patch_law import PatchLaws

@@ -29,8 +29,8 @@ FLOORS = {
         "arguments",
     ],
     "geometry": [
-        "interpolant legendre_modes materials sliding",
-        "face_frame filters spring_bed",
+        "face_frame interpolant materials sliding",
+        "filters spring_bed",
         "surface",
         "patches sliders spectrum statistics",
         "preparation rigid_plane",

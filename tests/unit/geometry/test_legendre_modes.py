@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.polynomial import Legendre
 
-from patchlaw.geometry.legendre_modes import mode_slopes
+from patchlaw.geometry.face_frame import mode_slopes
 
 
 def test_slopes_are_the_derivatives_of_legendre_polynomials():

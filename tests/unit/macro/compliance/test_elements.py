@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.face_frame import mode_values
 from patchlaw.macro.compliance.elements import across, nodal, upwards
 
 TICKS = np.array([-1.0, -0.3, 0.0])

@@ -5,7 +5,7 @@ import pytest
 from helpers.asperity_states import places
 from scipy.special import elliprf
 
-from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.face_frame import mode_values
 from patchlaw.micro import BodyModes, HertzContact
 from patchlaw.micro.asperities.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints

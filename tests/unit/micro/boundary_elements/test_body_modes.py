@@ -5,7 +5,7 @@ import pytest
 from helpers.uneven_grid import uneven_grid
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.face_frame import mode_values
 from patchlaw.micro import BodyModes
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.support import InputError

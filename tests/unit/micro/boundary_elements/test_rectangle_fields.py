@@ -5,7 +5,7 @@ import pytest
 from helpers.boussinesq import stresses
 
 from patchlaw.geometry import Material, PatchGrid
-from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.face_frame import mode_values
 from patchlaw.micro import RectangleFields, half_space_modes, half_space_stress_modes
 
 MATERIAL = Material(young_modulus=3000.0, poisson_ratio=0.2)

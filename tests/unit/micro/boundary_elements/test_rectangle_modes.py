@@ -6,7 +6,7 @@ from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.geometry.legendre_modes import mode_means
+from patchlaw.geometry.face_frame import mode_means
 from patchlaw.micro import FreeSides, half_space_modes, influence_matrix, side_modes
 from patchlaw.micro.boundary_elements.side_cells import side_cells
 from patchlaw.micro.closed_forms import love_mean

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
-from patchlaw.geometry.legendre_modes import mode_means, mode_values
+from patchlaw.geometry.face_frame import mode_means, mode_values
 from patchlaw.micro import (
     BodyStresses,
     FreeSides,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Material, MaterialPair
-from patchlaw.geometry.legendre_modes import mode_means
+from patchlaw.geometry.face_frame import mode_means
 from patchlaw.micro import TractionModes, half_space_traction_modes
 from patchlaw.micro.friction.tangential_grid import CrossCompliance, TangentialGrid
 from patchlaw.support import InputError

@@ -5,7 +5,7 @@ import pytest
 from helpers.free_motions import turning
 from scipy.optimize import linprog
 
-from patchlaw.micro.complementarity.admissible_start import clearance
+from patchlaw.micro.complementarity.cell_problem import clearance
 
 
 def brute_force(required, modes):
