@@ -5,7 +5,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers import calculix
+from helpers import body_meshes, calculix
 from helpers.block_cases import block_of, interface_of
 from helpers.contact_laws import PowerLaw, RangedLaw, Spring
 from helpers.faces import tagged
@@ -13,6 +13,7 @@ from helpers.plane_problems import rollers
 from helpers.user_problems import (
     BOTTOM,
     HEXAHEDRA,
+    PATCHES,
     TOP,
     box,
     clamped,
@@ -28,6 +29,7 @@ from scipy.spatial import KDTree
 
 from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
 from patchlaw.macro import (
+    FacePair,
     Interface,
     LawContactProblem,
     Material,
@@ -325,6 +327,27 @@ def test_modes_start_from_those_at_the_load_before(monkeypatch, friction):
     size = abs(afresh).max()  # accurate as above
     assert near == pytest.approx(afresh, rel=1e-9, abs=1e-9 * size)
     assert fewer < 0.8 * usual
+
+
+@pytest.mark.parametrize("factorised", [10_000, 0])
+@pytest.mark.parametrize("mode", ["pointwise", pytest.param("patchwise", marks=pytest.mark.long)])
+def test_two_mirrored_bodies_vibrate_as_one_on_twice_the_law(mode, factorised):
+    """Modes are alike in both, and the law is halved, or opposite, and contacts slip alone."""
+    draw = np.random.default_rng(5)
+    material = Material(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY)
+    meshes = (body_meshes.box((0, 0, z), (1, 1, z + 1), (2, 3, 2)) for z in (-1, 0))
+    one = body_meshes.standing(next(meshes), material, PATCHES)
+    both = FacePair(one, body_meshes.hanging(next(meshes), material, PATCHES))
+
+    def frequencies(face, *stiffness):
+        weight = face.sampling(mode).weight
+        tangents = np.ones((len(weight), 1, 1)) * np.diag(stiffness)
+        return FaceVibration(face, mode, None, factorised).modes(tangents, 8)[0].frequencies
+
+    normal, along = draw.uniform(5e3, 3e4, 2)
+    halves = frequencies(one, 2 * normal, 0, 0), frequencies(one, 0, 2 * along, 2 * along)
+    found = frequencies(both, normal, along, along)
+    assert found == pytest.approx(np.sort(np.concatenate(halves))[:8], rel=1e-12)
 
 
 def test_masses_are_those_of_the_volumes():
