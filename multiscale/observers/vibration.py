@@ -70,7 +70,9 @@ class VibrationObserver(StepObserver):
         sliding, mode = None, problem.forces.mode
         if section.sliding is not None:
             along = np.array(section.sliding) / np.hypot(*section.sliding)
-            sliding = np.outer(problem.sliders.coefficient, along)
+            sliders, patch = problem.sliders, problem.forces.sampling.patch
+            friction = sliders.coefficient if sliders else model.rubs[patch]  # slides as a whole
+            sliding = np.outer(friction, along)
         plane = None if section.plane == "held" else section.plane
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
