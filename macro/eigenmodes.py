@@ -331,7 +331,7 @@ class _Span:
         mine, (vectors, momenta, forces) = shares[:, chosen].T, self._parts
         left = mine @ forces - (shares @ along).T @ momenta
         sizes = left, (mine @ vectors) * self._problem.diagonal
-        rest, most = self._add([np.einsum("kn,kn->k", one, one) for one in sizes])
+        rest, most = (self._add(np.einsum("kn,kn->k", one, one)) for one in sizes)
         return left.T, rest > _NOISE**2 * most
 
 

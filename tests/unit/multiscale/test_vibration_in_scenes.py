@@ -145,8 +145,8 @@ def test_a_face_that_slides_as_a_whole_rubs_as_one_that_only_vibrates():
         run = Run(scene(**both, **wears))
         found.append([one.frequency_Hz for one in list(run.load_steps())[-1].modes])
         run.close()
-    # 5e-15 mm wear off, of a closure of 1e-3 mm
-    assert found[1] == pytest.approx(found[0], rel=1e-7)
+    # laws that run in have rows of their own, within 5 % of pressures far below these
+    assert found[1] == pytest.approx(found[0], rel=2e-4)
 
 
 @pytest.mark.long
