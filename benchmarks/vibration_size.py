@@ -5,7 +5,7 @@ also under mpirun; ``--scale 2`` halves the cells, ``--factorised N`` factorises
 Cubes and plates under laws of four patches at points; each held first, then sliding with μ = 0.4.
 CPU seconds are those of all ranks together, wall seconds in brackets; memory is what the modes need
 beyond the body with its matrix, all ranks together. PETSc counts factorisations, and applications
-of the preconditioner, which are cycles of multigrid or solves with factors. Ten minutes.
+of the preconditioner, which are cycles of multigrid. Ten minutes.
 """
 
 import os

@@ -11,24 +11,26 @@ from typing import Annotated, Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import eigh
+from scipy.linalg import eigh, solve
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.linear_solvers.options import has_mumps
+from patchlaw.macro.linear_solvers.solvers import Factors
 from patchlaw.support import Array, Count, Flags, Has, Indices, InputError, NotConverged, checked
-from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8
 """Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
-body has an inverse; bodies of 100 cells have their first mode at 1e-4."""
+body has an inverse; bodies of 100 cells have their first mode at 1e-4. What is left of a mode is
+compared with this part of the forces of its single nodes where its own forces are less."""
 _ROUNDING = 1e-12
-"""Eigenvalues over that largest one which are zeros, and skew over symmetric parts that are."""
-_TOLERANCE = 1e-10
-"""Error of eigenvalues at which SLEPc's iteration ends."""
+"""Squared frequency of a mode over the one that its nodes would have alone, and skew over symmetric
+part of a matrix, which are zeros."""
 _LARGEST_RESIDUAL = 1e-5
 """Beyond it modes are refused; they have 1e-8 and less where everything is as it should be."""
+_MOST_REFINED = 30
+"""Corrections of modes whose residual is larger, one by one: in a span they have the rounding of
+forces that are 1e14 times as large, which those of a heavy plane on a soft law are less than."""
 _ACCURATE, _NEXT = 1e-10, 1e-6
 """Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M, and
 of the mode beyond the wanted ones. With 1e-8 residuals of tetrahedra were 1e-6, for a fifth fewer
@@ -137,31 +139,34 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
-    if correct is None:
-        factors = _ShiftInvert(problem, count)
-        start = factors.found()[:, :count]  # others may come after one that is left out
-        correct = one_by_one(problem.stiffness, factors.solve)
+    inverse, own = problem.factors() if correct is None else correct, problem.own[:, None]
 
     def corrected(columns: Array) -> Array:
-        return problem.own[:, None] * correct(columns)
+        return own * inverse(columns)
 
-    modes = problem.stated(*_lowest_eigenpairs(problem, count, corrected, start))
-    left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
-    if not left < _LARGEST_RESIDUAL:
-        raise NotConverged(
-            "the natural modes",
-            reason=f"a residual of {left:.1e}",
-            iterations=0,
-            remedy="see that supports and masses are those of the body, and the preconditioner",
-        )
-    return modes
+    basis = _lowest(problem, count, corrected, start)
+    for _ in range(_MOST_REFINED):
+        modes = problem.modes(basis)
+        left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
+        if left < _LARGEST_RESIDUAL:
+            return modes
+        basis = basis - corrected(problem.left(basis))
+    raise _not_found(f"a residual of {left:.1e}", f"{_SEE}, and the preconditioner", _MOST_REFINED)
+
+
+_SEE = "see that supports and masses are those of the body"
+
+
+def _not_found(reason: str, remedy: str, iterations: int = 0) -> NotConverged:
+    what = "the natural modes"
+    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
 
 
 class _Problem:
     """K and M, without what is held, and which unknowns are free, of all and of this rank's own."""
 
     def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat, free: PETSc.Vec) -> None:
-        self._comm, self.free = free.comm.tompi4py(), free
+        self.comm, self.unknowns = free.comm.tompi4py(), round(free.sum())
         self.own = own = free.array_r > 0.0
         both = stiffness, mass
         if any(one.getSizes() != stiffness.getSizes() or not one.isAssembled() for one in both):
@@ -176,88 +181,58 @@ class _Problem:
             raise InputError("the stiffness has no positive diagonal, or the mass has none")
         diagonal.array[~own] = self._largest(diagonal.array_r)  # what is held has no mass
         self.stiffness.setDiagonal(diagonal)
+        self.diagonal = diagonal.array_r
         self.symmetric = _is_symmetric(self.stiffness)
         if not _is_symmetric(self.mass):
             raise InputError("the mass is not symmetric")
 
-    def stated(self, squares: Array, shapes: Array) -> NaturalModes:
-        """Return the modes of κ and φ, with what is left of K φ + λ² M φ."""
-        add, pair = self._comm.allreduce, (self.stiffness, self.mass)
-        forces, momenta = (
-            products(one, shapes.real) + 1j * products(one, shapes.imag) for one in pair
-        )
-        if self.symmetric:  # anew, as factors exaggerate rigid motions, at the cost of digits
-            squares, turned = eigh(*(add((shapes.T @ one).real) for one in (forces, momenta)))
-            shapes, forces, momenta = (one @ turned for one in (shapes, forces, momenta))
+    def factors(self) -> Factors:
+        """Return those of K + c M with a small c, as the stiffness of free bodies has none."""
+        shifted = self.stiffness.copy()
+        structure = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
+        shifted.axpy(_SHIFT * self.largest, self.mass, structure)
+        return Factors(shifted, symmetric=self.symmetric)
+
+    def modes(self, basis: Array) -> NaturalModes:
+        """Return the modes that real vectors span, this rank's rows (m, n), with their residuals.
+
+        The small problem is solved anew: in a larger span eigenvalues have its rounding.
+        """
+        add = self.comm.allreduce
+        forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
+        small = [add(basis.T @ one) for one in (forces, momenta)]
+        _, turned = eigh(*small) if self.symmetric else np.linalg.eig(solve(*small[::-1]))
+        turned = turned / np.sqrt(np.einsum("ik,ij,jk->k", turned.conj(), small[1], turned).real)
+        shapes, forces, momenta = (one @ turned for one in (basis, forces, momenta))
+        stiff = self.diagonal[:, None] * shapes
+        squares, alone = (add((shapes.conj() * one).sum(axis=0)) for one in (forces, stiff))
+        zero = abs(squares) <= _ROUNDING * alone.real + _ACCURATE**2 * self.largest
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
-        squares = np.where(abs(squares) > _ROUNDING * self.largest, squares, 0.0)
-        values = np.sqrt(-squares + 0j)
+        values = np.sqrt(-np.where(zero, 0.0, squares) + 0j)
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
-        size = np.sqrt(add((shapes.conj() * momenta).sum(axis=0).real))
-        values = values[order]
-        shapes, forces, momenta = ((one / size)[:, order] for one in (shapes, forces, momenta))
-        least = _SHIFT * self.largest  # rigid motions have no forces
-        left, of_body, of_mass, unit = (
+        floor = _SHIFT * np.where(
+            zero, self.largest * momenta, stiff
+        )  # rigid motions have no forces
+        left, *usual = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
-            for one in (forces + values**2 * momenta, forces, values**2 * momenta, momenta)
+            for one in (forces + values**2 * momenta, forces, values**2 * momenta, floor)
         )
-        residuals = left / (of_body + of_mass + least * unit)
-        return NaturalModes(eigenvalues=values, shapes=shapes, momenta=momenta, residuals=residuals)
+        return NaturalModes(
+            eigenvalues=values[order],
+            shapes=shapes[:, order] + 0j,
+            momenta=momenta[:, order] + 0j,
+            residuals=(left / sum(usual))[order],
+        )
+
+    def left(self, basis: Array) -> Array:
+        """Return what real vectors leave of K V = M V A with the best A, shape (m, n)."""
+        forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
+        small = (self.comm.allreduce(basis.T @ one) for one in (momenta, forces))
+        return np.asarray(forces - momenta @ solve(*small))
 
     def _largest(self, values: Array) -> float:
-        return float(max(self._comm.allgather(float(values.max(initial=0.0)))))
-
-
-class _ShiftInvert:
-    """SLEPc's Krylov-Schur method on factors of K + c M with a small c.
-
-    It takes a third of the solves of `_lowest_eigenpairs`, but starts from one vector, which may
-    leave out some of the modes that are repeated.
-    """
-
-    def __init__(self, problem: _Problem, count: int) -> None:
-        with optional_packages():
-            from slepc4py import SLEPc
-
-        kinds = SLEPc.EPS.ProblemType
-        self._solver = solver = SLEPc.EPS().create(problem.stiffness.comm)
-        solver.setOperators(problem.stiffness, problem.mass)
-        solver.setProblemType(kinds.GHEP if problem.symmetric else kinds.GNHEP)
-        solver.setDimensions(count)
-        solver.setTolerances(_TOLERANCE, 1000)
-        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
-        solver.setTarget(-_SHIFT * problem.largest)
-        solver.getST().setType("sinvert")
-        self._linear = linear = solver.getST().getKSP()
-        linear.setType("preonly")
-        linear.pc.setType("cholesky" if problem.symmetric else "lu")
-        if has_mumps():
-            linear.pc.setFactorSolverType("mumps")
-        self._vectors = problem.stiffness.createVecs()
-
-    def found(self) -> Array:
-        """Return the modes found, of pairs the real and the imaginary part, shape (m, k)."""
-        try:
-            self._solver.solve()
-        except PETSc.Error as error:  # of a factorisation: memory, or a matrix that has no inverse
-            raise NotConverged(
-                "the natural modes",
-                reason=str(error).splitlines()[-1],
-                iterations=0,
-                remedy="see that supports and masses are those of the body",
-            ) from None
-        columns, (real, imaginary) = [np.zeros((self._vectors[0].local_size, 0))], self._vectors
-        for k in range(self._solver.getConverged()):
-            value = self._solver.getEigenpair(k, real, imaginary)
-            parts = real.array_r, imaginary.array_r
-            if value.imag >= 0.0:  # else the second of a pair
-                columns.append(np.stack(parts[: 1 + int(value.imag > 0.0)], axis=1))
-        return np.hstack(columns)
-
-    def solve(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write the solution y for x."""
-        self._linear.solve(x, y)
+        return float(max(self.comm.allgather(float(values.max(initial=0.0)))))
 
 
 class _Span:
@@ -271,10 +246,8 @@ class _Span:
     """
 
     def __init__(self, problem: _Problem, most: int) -> None:
-        self._problem = problem
-        self._add = problem.free.comm.tompi4py().allreduce
-        self._diagonal = problem.stiffness.getDiagonal().array_r
-        self._room = np.empty((3, most, len(self._diagonal)))
+        self._problem, self._add = problem, problem.comm.allreduce
+        self._room = np.empty((3, most, len(problem.own)))
         self._small = np.zeros((0, 0))
 
     def __len__(self) -> int:
@@ -286,11 +259,13 @@ class _Span:
 
     def combined(self, shares: Array) -> Array:
         """Return combinations of the vectors, shape (m, k)."""
-        real, imaginary = (part.T @ self._parts[0] for part in (shares.real, shares.imag))
-        return np.asarray((real + 1j * imaginary).T)
+        return np.asarray((shares.T @ self._parts[0]).T)
 
-    def beside(self, columns: Array) -> _New:
-        """Return columns less their part in the span, with M times these and their sizes by M."""
+    def beside(self, columns: Array) -> tuple[Array, Array]:
+        """Return columns less their part in the span as rows (k, m), and their sizes by M (k,).
+
+        The size is zero where all that is left is rounding.
+        """
         vectors, momenta, _ = self._parts
         rows = columns.T
         rows = rows - self._add(rows @ momenta.T) @ vectors
@@ -298,89 +273,72 @@ class _Span:
         rows -= again @ vectors
         moved = products(self._problem.mass, rows.T).T
         squares = self._add(np.einsum("kn,kn->k", rows, moved))
-        return _New(rows, moved, np.sqrt(squares), (again**2).sum(axis=1))
+        lost = (again**2).sum(axis=1)
+        return rows, np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
 
-    def extend(self, new: _New) -> None:
-        """Take what `beside` returned, as far as that is not rounding."""
-        apart = new.sizes**2 > _NEW**2 * (new.sizes**2 + new.lost)
-        if not apart.any():
-            return
-        rows, momenta = (one[apart] / new.sizes[apart, None] for one in (new.rows, new.momenta))
+    def extend(self, rows: Array) -> None:
+        """Take vectors beside the span, shape (k, m), as far as they are no copies."""
+        momenta = products(self._problem.mass, rows.T).T
         for _ in range(2):  # vectors that are nearly copies leave 1e-6 of one another at first
             weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
             apart = weights > _COPY * weights[-1]
             turned = (turned[:, apart] / np.sqrt(weights[apart])).T
             rows, momenta = turned @ rows, turned @ momenta
         first, last = len(self), len(self) + len(rows)
-        self._room[:2, first:last] = rows, momenta
-        fresh = self._room[:, first:last]
-        fresh[2] = products(self._problem.stiffness, fresh[0].T).T
-        right = self._add(self._room[0, :last] @ fresh[2].T)
-        below = right[:first].T if self._problem.symmetric else self._below(first, last)
+        forces = products(self._problem.stiffness, rows.T).T
+        self._room[:, first:last] = rows, momenta, forces
+        vectors, _, all_forces = self._room[:, :last]
+        right = self._add(vectors @ forces.T)
+        symmetric = self._problem.symmetric
+        below = right[:first].T if symmetric else self._add(rows @ all_forces[:first].T)
         self._small = np.block([[self._small, right[:first]], [below, right[first:]]])
 
-    def _below(self, first: int, last: int) -> Array:
-        vectors, _, forces = self._room
-        return np.asarray(self._add(vectors[first:last] @ forces[:first].T))
-
-    def restart(self, shares: Array) -> None:
-        """Keep some orthonormal combinations of the vectors alone."""
+    def restart(self, shares: Array, past: Array) -> Array:
+        """Keep modes and those of the step before; return the shares of the modes in these."""
+        past = np.pad(past, ((0, len(self) - len(past)), (0, 0)))
+        both, triangle = np.linalg.qr(np.hstack([shares, past]))
+        both = both[:, abs(np.diag(triangle)) > _COPY]
         for part in self._room:
-            part[: shares.shape[1]] = shares.T @ part[: len(self)]
-        self._small = shares.T @ self._small @ shares
+            part[: both.shape[1]] = both.T @ part[: len(self)]
+        self._small = both.T @ self._small @ both
+        return np.asarray(both.T @ shares)
 
-    def modes(self) -> tuple[Any, Any]:
-        """Return κ of K φ = κ M φ in the span by rising magnitude, and the shares of the vectors.
+    def modes(self, count: int, most: int) -> tuple[Array, int]:
+        """Return the shares of the vectors in modes by rising |κ|, and how many are wanted.
 
-        Of a pair both stand together.
+        Of a complex pair, both of which count, they are those of the real and the imaginary part.
         """
+        small = self._small
         values, shares = (
-            np.linalg.eigh(0.5 * (self._small + self._small.T))
+            np.linalg.eigh(0.5 * (small + small.T))
             if self._problem.symmetric
-            else np.linalg.eig(self._small)
+            else np.linalg.eig(small)
         )
         order = np.argsort(abs(values), kind="stable")
-        return values[order], shares[:, order]
+        values, shares = values[order], shares[:, order]
+        ends = [min(size, len(values)) for size in (count, most)]
+        wanted, kept = (end + int(values[end - 1].imag > 0.0) for end in ends)
+        return np.where(values.imag < 0.0, shares.imag, shares.real)[:, :kept], wanted
 
-    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags, Flags]:
-        """Return what modes leave of their equations, whether that is no rounding, and too large.
+    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags]:
+        """Return what modes leave of their equations, and whether that is no rounding.
 
         Args:
-            shares: Of a pair the real and the imaginary part of the first, which span what both do.
+            shares: Those of all modes, which span what both parts of a pair do.
             chosen: The modes that are asked for.
         """
         along = np.linalg.lstsq(shares, self._small @ shares, rcond=None)[0][:, chosen]
-        vectors, momenta, forces = self._parts
-        mine = shares[:, chosen].T
+        mine, (vectors, momenta, forces) = shares[:, chosen].T, self._parts
         left = mine @ forces - (shares @ along).T @ momenta
-        own = mine @ forces, _SHIFT * self._problem.largest * (mine @ momenta)
-        sizes = [left, (mine @ vectors) * self._diagonal, *own]
-        rest, most, *usual = np.sqrt([self._add(np.einsum("kn,kn->k", one, one)) for one in sizes])
-        return left.T, rest > _NOISE * most, rest > _LARGEST_RESIDUAL * np.add(*usual)
+        sizes = left, (mine @ vectors) * self._problem.diagonal
+        rest, most = (self._add(np.einsum("kn,kn->k", one, one)) for one in sizes)
+        return left.T, rest > _NOISE**2 * most
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _New:
-    """Vectors beside a span, as rows, M times these and their sizes by M.
-
-    ``lost`` are the squares of what a second orthogonalisation took from them.
-    """
-
-    rows: Array
-    momenta: Array
-    sizes: Array
-    lost: Array
-
-    def only(self, chosen: Flags) -> _New:
-        """Return some of them."""
-        parts = self.rows, self.momenta, self.sizes, self.lost
-        return _New(*(one[chosen] for one in parts))
-
-
-def _lowest_eigenpairs(
+def _lowest(
     problem: _Problem, count: int, correct: Corrections, start: Array | None = None
-) -> tuple[Array, Array]:
-    """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
+) -> Array:
+    """Return real vectors that span the modes next to zero, by Davidson's method in blocks.
 
     Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
     that are not accurate extend it, and it restarts from the latest modes and those of the step
@@ -397,7 +355,7 @@ def _lowest_eigenpairs(
         start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
 
     Returns:
-        κ by rising magnitude, shape (n,), and this rank's rows of φ, complex, shape (m, n).
+        This rank's rows, shape (m, n).
 
     Raises:
         NotConverged: After 300 steps.
@@ -405,65 +363,43 @@ def _lowest_eigenpairs(
     Note:
         Collective.
     """
-    block, unknowns = count + _BESIDE, round(problem.free.sum())
+    block = count + _BESIDE
     first = _first(problem, block, correct, start)
     span = _Span(problem, _ROOM * block + first.shape[1])
-    errors, past, new = np.ones(0), np.zeros((0, 0)), span.beside(first)
-    if not (new.sizes > 0.0).all():
-        raise NotConverged(
-            "the natural modes",
-            reason="the preconditioner returns zeros, or what is no number",
-            iterations=0,
-            remedy="see that it is near the inverse of the stiffness",
-        )
+    errors, past, (rows, sizes) = np.ones(0), np.zeros((0, 0)), span.beside(first)
+    if not (sizes > 0.0).all():
+        reason = "the preconditioner returns zeros, or what is no number"
+        raise _not_found(reason, "see that it is near the inverse of the stiffness")
     for _ in range(_MOST_STEPS):
-        span.extend(new)
-        values, shares = span.modes()
-        wanted, kept = (
-            end + int(values[end - 1].imag > 0.0)
-            for end in (min(size, len(values)) for size in (count, block))
-        )
-        real = np.where(values.imag < 0.0, shares.imag, shares.real)[:, :kept]
-        limits = np.where(np.arange(min(wanted + 1, kept)) < wanted, _ACCURATE, _NEXT)
+        if sizes.any():
+            span.extend(rows[sizes > 0.0] / sizes[sizes > 0.0, None])
+        shares, wanted = span.modes(count, block)
+        limits = np.where(np.arange(min(wanted + 1, shares.shape[1])) < wanted, _ACCURATE, _NEXT)
         if len(errors) != len(limits) or (errors < limits).all():
             errors = np.ones(len(limits))  # once more of all: modes may have changed places
         asked = np.flatnonzero(errors >= limits)
-        left, is_some, is_large = span.residuals(real, asked)
-        new = span.beside(correct(left))  # in the span modes are the best ones
-        errors[asked] = np.where(is_some, new.sizes, 0.0)
-        vibrates = abs(values[asked]) > _ROUNDING * problem.largest
-        errors[asked[is_some & is_large & vibrates & (asked < wanted)]] = 1.0  # would be refused
+        left, is_some = span.residuals(shares, asked)
+        rows, sizes = span.beside(correct(left))  # in the span modes are the best ones
+        errors[asked] = np.where(is_some, sizes, 0.0)
         converged = len(asked) == len(limits) and (errors < limits).all()
-        if converged or len(span) == unknowns:
-            return values[:wanted] + 0j, span.combined(shares[:, :wanted])
-        new = new.only((errors >= limits)[asked])
-        if len(span) + len(new.sizes) > _ROOM * block:
-            both = _latest(real, past)
-            span.restart(both)
-            real = both.T @ real
-        past = real
-    raise NotConverged(
-        "the natural modes",
-        reason=f"{int((errors[:count] < _ACCURATE).sum())} of {count} modes",
-        iterations=_MOST_STEPS,
-        remedy="ask for fewer modes; see that supports and masses are those of the body",
-    )
+        if converged or len(span) == problem.unknowns:
+            return span.combined(shares[:, :wanted])
+        further = (errors >= limits)[asked]
+        rows, sizes = rows[further], sizes[further]
+        if len(span) + len(rows) > _ROOM * block:
+            shares = span.restart(shares, past)
+        past = shares
+    done = f"{int((errors[:count] < _ACCURATE).sum())} of {count} modes"
+    raise _not_found(done, f"ask for fewer modes; {_SEE}", _MOST_STEPS)
 
 
 def _first(problem: _Problem, block: int, correct: Corrections, start: Array | None) -> Array:
     """Return vectors that the span starts from: given ones, and corrected random ones."""
-    own, rank = problem.own[:, None], problem.free.comm.rank
+    own, rank = problem.own[:, None], problem.comm.rank
     first = np.zeros((len(own), 0)) if start is None else own * start
     width = max(_BESIDE, block - first.shape[1])
     random = np.random.default_rng(rank).standard_normal((len(own), width))
     return np.hstack([first, correct(own * random)])
-
-
-def _latest(real: Array, past: Array) -> Array:
-    """Return orthonormal shares of the latest modes and of those of the step before."""
-    before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
-    both, triangle = np.linalg.qr(np.hstack([real, before]))
-    return np.asarray(both[:, abs(np.diag(triangle)) > _COPY])
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

@@ -28,7 +28,7 @@ _SCENES = (
 )
 _FINITE_ELEMENTS = (
     "bodies of finite elements",
-    "basix dolfinx ffcx mpi4py petsc4py slepc4py ufl",
+    "basix dolfinx ffcx mpi4py petsc4py ufl",
     "take dolfinx, petsc4py and mpi4py from one source: Debian by ./setup.sh, wheels by "
     "pip install 'patchlaw[fenicsx]' (Python 3.12 or newer), or conda-forge by environment.yml",
 )

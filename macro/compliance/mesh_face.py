@@ -37,7 +37,7 @@ from patchlaw.macro.contact.other_elements import refined_body
 from patchlaw.macro.elastic_body import stiffness_form
 from patchlaw.macro.linear_solvers.options import PREFIX
 from patchlaw.macro.linear_solvers.selection import FACTORISED
-from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_at_once
+from patchlaw.macro.linear_solvers.solvers import Factors, solve_linear
 from patchlaw.macro.mesh.block import FLAT
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
@@ -404,7 +404,9 @@ def _displacements(moments: FaceMoments, loads: Sequence[_Load]) -> Iterator[tup
     at_once = body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type")
     if at_once:
         forces = np.stack([free * loads[which].load(mode) for which, mode in places], axis=1)
-        solved = solved_at_once(body.stiffness, forces)
+        factors = Factors(body.stiffness)
+        solved = factors(forces)
+        factors.destroy()
     for number, (which, mode) in enumerate(places):
         if not at_once:
             load.array[:] = free * loads[which].load(mode)

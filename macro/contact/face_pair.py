@@ -32,6 +32,7 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
+from patchlaw.macro.linear_solvers.solvers import LinearSolver
 from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, Opposite
 from patchlaw.macro.mesh.facet_parts import straight_parts
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
@@ -98,9 +99,9 @@ class BodyPair:
         return None
 
     @cached_property
-    def solver(self) -> PETSc.KSP:
+    def solver(self) -> LinearSolver:
         """Linear solver of both; its preconditioner also serves the contact solves."""
-        solver = PETSc.KSP().create(self.comm)
+        solver = LinearSolver().create(self.comm)
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self.stiffness)
         set_own_preconditioner(solver, self._preconditioner)

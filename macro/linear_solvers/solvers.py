@@ -19,6 +19,7 @@ from patchlaw.macro.linear_solvers.options import (
     SMOOTHED,
     WeakContext,
     default_options,
+    has_mumps,
     reason_name,
 )
 from patchlaw.support import Array, NotConverged
@@ -402,33 +403,44 @@ def solve_linear(
     return int(solver.its)
 
 
-def solved_at_once(matrix: PETSc.Mat, right: Array) -> Array:
-    """Solve for many right-hand sides with one factorisation by MUMPS.
+class Factors:
+    """Factors of a matrix, by MUMPS where PETSc has it, that solve for many right-hand sides.
 
     Args:
-        matrix: Symmetric positive definite.
-        right: This rank's rows of the right-hand sides, shape (n, m).
+        matrix: The matrix.
+        symmetric: Whether it is symmetric.
 
-    Returns:
-        The solutions, shape (n, m).
+    Raises:
+        NotConverged: When the factorisation fails.
 
     Note:
-        Collective.
+        Everything is collective.
     """
-    solver, factorised = PETSc.KSP().create(matrix.comm), pointwise(matrix)
-    solver.setOperators(factorised)
-    solver.setType("preonly")
-    solver.pc.setType("cholesky")
-    solver.pc.setFactorSolverType("mumps")
-    set_up(solver)
-    arrays = np.asfortranarray(right), np.zeros(right.shape, order="F")
-    size = (matrix.getLocalSize()[0], matrix.getSize()[0]), (None, right.shape[1])
-    dense = [PETSc.Mat().createDense(size, array=a, comm=matrix.comm) for a in arrays]
-    solver.pc.getFactorMatrix().matSolve(*dense)
-    own = () if factorised is matrix else (factorised,)
-    for part in (*dense, solver.pc, solver, *own):  # PETSc keeps objects that Python drops
-        part.destroy()
-    return arrays[1]
+
+    def __init__(self, matrix: PETSc.Mat, *, symmetric: bool = True) -> None:
+        self._matrix, self._solver = pointwise(matrix), PETSc.KSP().create(matrix.comm)
+        self._own = () if self._matrix is matrix else (self._matrix,)
+        self._solver.setOperators(self._matrix)
+        self._solver.setType("preonly")
+        self._solver.pc.setType("cholesky" if symmetric else "lu")
+        if has_mumps():
+            self._solver.pc.setFactorSolverType("mumps")
+        set_up(self._solver)
+
+    def __call__(self, right: Array) -> Array:
+        """Return the solutions for this rank's rows of right-hand sides, shape (n, m)."""
+        arrays = np.asfortranarray(right), np.zeros(right.shape, order="F")
+        size = (len(right), self._matrix.getSize()[0]), (None, right.shape[1])
+        dense = [PETSc.Mat().createDense(size, array=a, comm=self._matrix.comm) for a in arrays]
+        self._solver.pc.getFactorMatrix().matSolve(*dense)
+        for one in dense:  # PETSc keeps objects that Python drops
+            one.destroy()
+        return arrays[1]
+
+    def destroy(self) -> None:
+        """Let go of the factors."""
+        for part in (self._solver.pc, self._solver, *self._own):
+            part.destroy()
 
 
 def set_up(solver: PETSc.KSP, margins: Sequence[int] = MARGINS) -> None:

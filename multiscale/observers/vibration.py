@@ -25,6 +25,7 @@ from patchlaw.support.readable import Caution, measured, number, quantity
 
 _DRAWN = 6
 """Modes that are drawn."""
+_PARTICIPATION = [f"participation_{axis}" for axis in "xyz"]
 
 
 class _Seen(NamedTuple):
@@ -66,15 +67,10 @@ class VibrationObserver(StepObserver):
 
         scene, model = self._coupling.scene, self._coupling.model
         section = scene.vibration
-        problem, state = model.solved
-        sliding, mode = None, problem.forces.mode
-        if section.sliding is not None:
-            along = np.array(section.sliding) / np.hypot(*section.sliding)
-            sliding = np.outer(problem.sliders.coefficient, along)
         plane = None if section.plane == "held" else section.plane
+        tangents, mode = self._tangents(), model.solved[0].forces.mode
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
-        tangents = problem.forces.vibration_tangents(state, sliding)
         with located(key="vibration.modes"):
             found, shares = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
@@ -85,20 +81,19 @@ class VibrationObserver(StepObserver):
         whole = by_load + frequency * found.residuals
         if by_elements is not None:
             whole = whole + by_elements
-        known = bool(step.errors) or by_elements is not None
         columns = {
             "frequency_Hz": frequency,
+            "frequency_error_Hz": whole if step.errors or by_elements is not None else None,
             "damping_per_s": found.damping,
             "contact_share": shares,
+            **dict(zip(_PARTICIPATION, self._made.participation(found).T, strict=True)),
             "residual": found.residuals,
-            **({"frequency_error_Hz": whole} if known else {}),
-            **({"element_error_Hz": by_elements} if by_elements is not None else {}),
+            "element_error_Hz": by_elements,
         }
-        for axis, part in zip("xyz", self._made.participation(found).T, strict=True):
-            columns[f"participation_{axis}"] = part
+        known = {name: values for name, values in columns.items() if values is not None}
         rows = tuple(
-            Mode(mode=k + 1, **{name: float(values[k]) for name, values in columns.items()})
-            for k in range(len(frequency))
+            Mode(mode=k, **dict(zip(known, map(float, row), strict=True)))
+            for k, row in enumerate(zip(*known.values(), strict=True), 1)
         )
         surfaces = []
         if last:
@@ -107,6 +102,16 @@ class VibrationObserver(StepObserver):
         springs = face_springs(model.face, mode, tangents)
         self._latest = _Seen(found, springs, rows, surfaces)
         return rows
+
+    def _tangents(self) -> Array:
+        """Return the stiffnesses of the contact at its samples, see `vibration_tangents`."""
+        scene, model = self._coupling.scene, self._coupling.model
+        (problem, state), sliding = model.solved, None
+        if (direction := scene.vibration.sliding) is not None:
+            sliders, patch = problem.sliders, problem.forces.sampling.patch
+            friction = sliders.coefficient if sliders else model.rubs[patch]  # slides as a whole
+            sliding = np.outer(friction, np.array(direction) / np.hypot(*direction))
+        return np.asarray(problem.forces.vibration_tangents(state, sliding))
 
     def _element_errors(
         self, tangents: Array, frequency: Array, plane: float | None, *, last: bool

@@ -5,13 +5,15 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers import calculix
+from helpers import body_meshes, calculix
 from helpers.block_cases import block_of, interface_of
-from helpers.contact_laws import RangedLaw, Spring
+from helpers.contact_laws import PowerLaw, RangedLaw, Spring
+from helpers.faces import tagged
 from helpers.plane_problems import rollers
 from helpers.user_problems import (
     BOTTOM,
     HEXAHEDRA,
+    PATCHES,
     TOP,
     box,
     clamped,
@@ -23,9 +25,11 @@ from petsc4py import PETSc
 from scipy.io import mmread
 from scipy.linalg import eig, eigh
 from scipy.optimize import brentq
+from scipy.spatial import KDTree
 
 from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane
 from patchlaw.macro import (
+    FacePair,
     Interface,
     LawContactProblem,
     Material,
@@ -74,30 +78,36 @@ def on_plane(mesh, law, degree=1, approach=1e-3, **more):
 
 
 def test_bar_on_a_law_vibrates_as_in_closed_form():
-    length, side, law = 4.0, 0.5, 1700.0
-    lengths = (side, side, length)
-    mesh = box(cells=(1, 1, 32), cell=HEXAHEDRA, lengths=lengths)
-    rough, space, tags = on_plane(mesh, Spring(law), 2)
+    draw = np.random.default_rng(51)
+    length, side, approach = draw.uniform([3.0, 0.3, 1e-3], [5.0, 0.7, 4e-3])
+    law = PowerLaw(draw.uniform(2e4, 4e4), power=draw.uniform(1.4, 1.6))
+    mesh = box(cells=(1, 1, 56), cell=HEXAHEDRA, lengths=(side, side, length))
+    rough, space, tags = on_plane(mesh, law, 2, approach)
     across = [(axis, place) for axis in (0, 1) for place in (0.0, side)]
     bcs = [clamped(space, tags), *rollers(space, *across)]
     stiffness, mass = matrices(space)
     contact = rough.stiffness_matrix(fem.Function(space))
     found = natural_modes(with_contact(stiffness, contact), mass, 3, bcs=bcs)
-    # u = sin βz from the clamp on: E β cos βL = −k sin βL
-    roots = [
-        brentq(
-            lambda beta: YOUNG * beta * np.cos(beta * length) + law * np.sin(beta * length),
-            (n + 0.5) * np.pi / length,
-            (n + 1.0) * np.pi / length,
-        )
-        for n in range(3)
-    ]
-    expected = SPEED * np.array(roots) / (2.0 * np.pi)
-    # quadratic elements err by (β h)⁴/720: 2e-8, 4e-7, 3e-6 of the frequency
-    assert found.frequencies == pytest.approx(expected, rel=4e-6)
-    assert found.frequencies[0] == pytest.approx(expected[0], rel=5e-8)
-    # rounding of the stiffness, whose largest eigenvalue is 1e5 times that of the first mode
-    assert not found.damping.any() and found.residuals.max() < 1e-8
+
+    def off(slope):
+        """Frequencies over those of u = sin βz from the clamp on: E β cos βL = −k sin βL."""
+        roots = [
+            brentq(
+                lambda beta: YOUNG * beta * np.cos(beta * length) + slope * np.sin(beta * length),
+                (n + 0.5) * np.pi / length,
+                (n + 1.0) * np.pi / length,
+                xtol=1e-14,
+            )
+            for n in range(3)
+        ]
+        return abs(2.0 * np.pi * found.frequencies / (SPEED * np.array(roots)) - 1.0)
+
+    slope = law.power * law.k * approach ** (law.power - 1.0)
+    # quadratic elements err by (β h)⁴/1440: 2e-9, 4e-8, 3e-7 of the frequency
+    assert (off(slope) < 5e-7).all() and off(slope)[0] < 5e-9
+    assert off(1.00001 * slope).max() > 5e-7
+    # rounding of the stiffness, whose largest eigenvalue is 1e6 times that of the first mode
+    assert not found.damping.any() and found.residuals.max() < 1e-6
 
 
 def test_beam_on_springs_heaves_and_pitches_as_a_rigid_body_and_bends_by_a_shift():
@@ -218,6 +228,28 @@ def test_mass_of_the_plane_adds_to_the_bar():
     assert 0.0 < shares[0] < 1.0
 
 
+@pytest.mark.parametrize("factorised", [10_000, 0])
+@pytest.mark.parametrize("friction", [None, 0.37])
+def test_a_heavy_plane_on_a_soft_law_swings_far_below_all_other_modes(friction, factorised):
+    """Its square is 1e-17 of the largest, which was once taken for zero."""
+    draw = np.random.default_rng(7)
+    law, plane = draw.uniform(0.5, 2.0) * np.array([1e-3, 1.0])
+    block = block_of("roller", YOUNG, 0.0, density=DENSITY, cells=(3, 2, 4))
+    (width, depth), height = block.mesh.shape.interface, block.mesh.shape.height
+    face = interface_of(block, (1, 1))
+    problem = LawContactProblem(face, [Spring(law)], "pointwise")
+    along = None if friction is None else np.array([friction, 0.1])
+    state = problem.solve(Control(approach=1e-3))
+    tangents = problem.forces.vibration_tangents(state, along)
+    found, shares = FaceVibration(face, "pointwise", plane, factorised).modes(tangents, 3)
+    series = width * depth / (1.0 / law + height / YOUNG)
+    expected = np.sqrt(series / plane) / (2.0 * np.pi)
+    # the block's mass is 1e-9 of the plane's
+    assert found.frequencies[0] == pytest.approx(expected, rel=2e-9)
+    assert found.frequencies[1] > 1e6 * expected and not found.damping.any()
+    assert shares[0] == pytest.approx(1.0, abs=1e-5)
+
+
 def test_slepc_finds_the_same_modes_of_a_face_that_slides():
     SLEPc = pytest.importorskip("slepc4py.SLEPc")
     mesh = box(cells=(3, 2, 2), cell=HEXAHEDRA)
@@ -297,6 +329,27 @@ def test_modes_start_from_those_at_the_load_before(monkeypatch, friction):
     assert fewer < 0.8 * usual
 
 
+@pytest.mark.parametrize("factorised", [10_000, 0])
+@pytest.mark.parametrize("mode", ["pointwise", pytest.param("patchwise", marks=pytest.mark.long)])
+def test_two_mirrored_bodies_vibrate_as_one_on_twice_the_law(mode, factorised):
+    """Modes are alike in both, and the law is halved, or opposite, and contacts slip alone."""
+    draw = np.random.default_rng(5)
+    material = Material(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY)
+    meshes = (body_meshes.box((0, 0, z), (1, 1, z + 1), (2, 3, 2)) for z in (-1, 0))
+    one = body_meshes.standing(next(meshes), material, PATCHES)
+    both = FacePair(one, body_meshes.hanging(next(meshes), material, PATCHES))
+
+    def frequencies(face, *stiffness):
+        weight = face.sampling(mode).weight
+        tangents = np.ones((len(weight), 1, 1)) * np.diag(stiffness)
+        return FaceVibration(face, mode, None, factorised).modes(tangents, 8)[0].frequencies
+
+    normal, along = draw.uniform(5e3, 3e4, 2)
+    halves = frequencies(one, 2 * normal, 0, 0), frequencies(one, 0, 2 * along, 2 * along)
+    found = frequencies(both, normal, along, along)
+    assert found == pytest.approx(np.sort(np.concatenate(halves))[:8], rel=1e-12)
+
+
 def test_masses_are_those_of_the_volumes():
     mesh = box(cells=(2, 3, 4))
     tags, cells = marked(mesh), np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
@@ -374,6 +427,73 @@ def test_calculix_finds_our_frequencies_with_our_springs(tmp_path, sticks):
     assert frequencies == pytest.approx(found.frequencies, rel=1e-6)
     written = mmread(tmp_path / "contact.mtx").toarray()
     assert written.sum() == pytest.approx(total(contact), rel=1e-12)
+
+
+def test_springs_of_zones_under_a_tilted_plane_are_those_of_a_form(tmp_path):
+    """Each of the two zones has its law; UFL assembles the same stiffness from the closures."""
+    draw = np.random.default_rng(17)
+    lengths = tuple(draw.uniform(0.7, 1.4, 3))
+    mesh = box(cells=(4, 3, 2), lengths=lengths)
+    facets = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    beyond = dmesh.compute_midpoints(mesh, 2, facets)[:, 0] > 0.5 * lengths[0]
+    tags = tagged(mesh, {n: facets[beyond == n] for n in (0, 1)})
+    space = compat.vector_space(mesh, 1)
+    laws = [PowerLaw(draw.uniform(1e4, 5e4), power=2.0 + n) for n in (0, 1)]
+    approach, tilt = draw.uniform(5e-3, 8e-3), tuple(draw.uniform(-2e-3, 2e-3, 2))
+    plane = RigidPlane(approach=approach, tilt=tilt)
+    names, own = {"a": 0, "b": 1}, dict(zip("ab", laws, strict=True))
+    rough = Interface(space, tags, laws=own, names=names, indenter=plane)
+    u = fem.Function(space)
+    u.x.array[:] = draw.uniform(0.0, 1e-3, len(u.x.array))
+    v, w, x = ufl.TestFunction(space), ufl.TrialFunction(space), ufl.SpatialCoordinate(mesh)
+    closure = approach + u[2] + sum(t * (x[i] - 0.5 * lengths[i]) for i, t in enumerate(tilt))
+    ds = ufl.Measure(
+        "ds",
+        domain=mesh,
+        subdomain_data=tags,
+        metadata={"quadrature_degree": rough.quadrature_degree},
+    )
+    form = sum(
+        law.power * law.k * closure ** (law.power - 1.0) * v[2] * w[2] * ds(n)
+        for n, law in enumerate(laws)
+    )
+    expected = compat.assemble_matrix(compat.compile_form(form), [])
+    expected = expected.convert("dense", PETSc.Mat()).getDenseArray()
+    for ending in ("inp", "mtx"):
+        write_contact_stiffness(tmp_path / f"c.{ending}", rough.stiffness_matrix(u), space)
+    places, tree = space.tabulate_dof_coordinates(), KDTree(space.tabulate_dof_coordinates())
+    for ending in ("inp", "mtx"):
+        path = tmp_path / f"c.{ending}"
+        number, place = nodes_of(path)
+        row = tree.query(place)[1]
+        assert abs(places[row] - place).max() < 1e-8
+        dofs = (3 * row[:, None] + np.arange(3)).ravel()
+        written = mmread(path).toarray() if ending == "mtx" else springs(path, number)
+        found = np.zeros_like(expected)
+        found[np.ix_(dofs, dofs)] = written
+        # 14 digits of a spring are written, of which some cancel
+        assert abs(found - expected).max() < 1e-12 * abs(expected).max()
+
+
+def nodes_of(path):
+    """Return numbers and places of the nodes of a written stiffness."""
+    lines = path.read_text().splitlines()
+    lines = [line.lstrip("*% ") for line in lines if line[:2] in ("**", "% ")]
+    rows = np.array([line.split(",") for line in lines if line[0].isdigit()], float)
+    return rows[:, 1].astype(int), rows[:, 2:]
+
+
+def springs(path, numbers):
+    """Return the sum of the springs of a file, by rows of its nodes."""
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("**")]
+    row_of = {int(number): row for row, number in enumerate(numbers)}
+    whole = np.zeros((3 * len(numbers),) * 2)
+    for _, nodes, _, axes, value in zip(*(lines[k::5] for k in range(5)), strict=True):
+        ends = zip(nodes.split(",")[1:], axes.split(","), strict=True)
+        dofs = [3 * row_of[int(node)] + int(axis) - 1 for node, axis in ends]
+        signs = np.array([1.0, -1.0])[: len(dofs)]
+        whole[np.ix_(dofs, dofs)] += float(value) * np.outer(signs, signs)
+    return whole
 
 
 def total(matrix):

@@ -117,7 +117,7 @@ def _worn_heights(run: Run) -> Files:
         yield "worn.xyz", text.getvalue()
 
 
-LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pydantic pint matplotlib".split()
+LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
 
 

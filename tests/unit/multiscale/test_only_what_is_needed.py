@@ -100,7 +100,7 @@ def test_only_laws_on_tetrahedra_load_finite_elements(loaded):
     for name in ("concurrent", "hexahedra"):
         assert not loaded[name].intersection(("dolfinx", "petsc4py")), name
     assert {"dolfinx", "petsc4py"} <= loaded["tetrahedra"]
-    vibration = {"slepc4py", "patchlaw.multiscale.observers.vibration", "patchlaw.macro.eigenmodes"}
+    vibration = {"patchlaw.multiscale.observers.vibration", "patchlaw.macro.eigenmodes"}
     assert not loaded["tetrahedra"] & vibration
 
 

@@ -132,6 +132,24 @@ def test_sliding_with_a_heavy_plane_is_reported(tmp_path):
 
 
 @pytest.mark.long
+def test_a_face_that_slides_as_a_whole_rubs_as_one_that_only_vibrates():
+    """It has no springs along the face; its wear is too little to matter."""
+    output = {"figures": False, "report": False, "check": "none", "fields": False}
+    both = {"friction": {"coefficient": 0.43}, "output": output}
+    both |= {"vibration": {"modes": 5, "sliding": [0.3, 0.4], "plane": "3 g"}}
+    load, found = {"pressure": "5 MPa", "steps": 1}, []
+    for wears in (
+        {"load": load},
+        {"load": load | {"sliding": "1 mm"}, "wear": {"coefficient": "1e-15 mm^2/N"}},
+    ):
+        run = Run(scene(**both, **wears))
+        found.append([one.frequency_Hz for one in list(run.load_steps())[-1].modes])
+        run.close()
+    # laws that run in have rows of their own, within 5 % of pressures far below these
+    assert found[1] == pytest.approx(found[0], rel=2e-4)
+
+
+@pytest.mark.long
 def test_modes_that_are_not_found_leave_none_of_an_earlier_step(tmp_path, monkeypatch):
     load = {"pressure": "5 MPa", "steps": 2}
     run = Run(scene(load=load, vibration={"modes": 1}))
