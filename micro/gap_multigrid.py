@@ -7,6 +7,8 @@ grids have the operator that follows. Pools of fluid between contact that no coa
 or that are linked to one by a narrow link alone, would be lost so: cells have a small link to both
 sides besides (`_SHARE`), by which a coarse cell in contact can stand for the pool beside it.
 
+On one coarse grid pools are corrected besides (`gap_pools`).
+
 One cycle, in single precision, preconditions `gap_iteration`. Flows in several directions are
 solved together, as arrays whose first axis is the direction.
 
@@ -25,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from patchlaw.micro.gap_pools import Pools
 from patchlaw.support import Array
 
 Offset = tuple[int, int]
@@ -41,6 +44,8 @@ _SHARE = 1e-5
 7 to 21 with 10⁻³; some took more than 40 without."""
 COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
+_WITH_POOLS = 128**2
+"""Cells of the coarse grid that pools are made of, at most."""
 _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
 
@@ -201,6 +206,21 @@ class _Grid:
                 found[key] += np.multiply(weight, row, out=row)
         return found, -found.pop((0, 0))
 
+    def pools(self) -> Pools:
+        """Return its pools, with cells in the order of their parities."""
+        count, numbers, ends = self.inverse[0, 0].size, dict[Offset, NDArray[Any]](), []
+        for k, one in enumerate(PARITIES):
+            numbers[one] = np.arange(k * count, (k + 1) * count).reshape(self.shape)
+        for one, (key, link) in (
+            (one, each) for one in PARITIES for each in self.links[one].items()
+        ):
+            other, base = _halves(one[0] + key[0], one[1] + key[1])
+            some = link != 0.0
+            ends.append((numbers[one][some], shifted(numbers[other], base)[some], link[some]))
+        tail, head, link = map(np.concatenate, zip(*ends, strict=True))
+        diagonal = _flat(self.diagonal)
+        return Pools(tail, head, link, np.where(diagonal > _LEAST, diagonal, 0.0))
+
     def relaxes_alone(self, entirely: bool) -> None:
         """Free what only coarser grids are made from, and iterations on the finest one need."""
         self.weights.clear()
@@ -268,11 +288,13 @@ class Cycle:
     """
 
     def __init__(self, links: Parts, diagonal: Array) -> None:
-        self.grids = [_Grid(links, diagonal)]
+        self.grids, self._pools = [_Grid(links, diagonal)], dict[int, Pools]()
         while max(self.grids[-1].shape[1:]) > COARSEST:
             coarser = self.grids[-1].coarser()
             self.grids[-1].relaxes_alone(len(self.grids) > 1)
             self.grids.append(_Grid(*coarser))
+            if not self._pools and coarser[1][0].size <= _WITH_POOLS:
+                self._pools[len(self.grids) - 1] = self.grids[-1].pools()
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
     def __call__(self, right: Parts, depth: int = 0) -> Parts:
@@ -282,7 +304,11 @@ class Cycle:
             right: Right side by parity, in single precision.
             depth: Number of the grid, 0 for the finest.
         """
-        grid = self.grids[depth]
+        grid, pools = self.grids[depth], self._pools.get(depth)
+        if pools:
+            changes, left = pools.changes(_flat(right))
+            for one, part in zip(PARITIES, np.split(left, 4), strict=True):
+                right[one][:] = part.reshape(grid.shape)
         coarse = grid.before(right)
         change = np.empty_like(coarse)
         if depth + 1 < len(self.grids):
@@ -293,7 +319,18 @@ class Cycle:
             flat = coarse.reshape(len(coarse), -1, 1)
             change[:] = (self._inverse @ flat).reshape(coarse.shape)
         grid.after(right, change)
-        return grid.found.own
+        found = grid.found.own
+        if pools:
+            for one, part in zip(
+                PARITIES, np.split(pools.balanced(_flat(found), changes), 4), strict=True
+            ):
+                found[one][:] = part.reshape(grid.shape)
+        return found
+
+
+def _flat(parts: Parts) -> NDArray[np.floating]:
+    """Return values of cells in the order of their parities."""
+    return np.concatenate([parts[one].ravel() for one in PARITIES])
 
 
 def _inverse(links: Parts, diagonal: Array) -> Array:
