@@ -44,8 +44,9 @@ _SHARE = 1e-5
 7 to 21 with 10⁻³; some took more than 40 without."""
 COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
-_WITH_POOLS = 128**2
-"""Cells of the coarse grid that pools are made of, at most."""
+_WITH_POOLS = 2
+"""Number of the grid, 0 for the finest, whose pools are corrected besides. Smaller pools have cells
+of their own until there; larger ones took 22 iterations in place of 18 where it was the third."""
 _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
 
@@ -208,18 +209,17 @@ class _Grid:
 
     def pools(self) -> Pools:
         """Return its pools, with cells in the order of their parities."""
-        count, numbers, ends = self.inverse[0, 0].size, dict[Offset, NDArray[Any]](), []
+        count, numbers = self.inverse[0, 0].size, {}
         for k, one in enumerate(PARITIES):
             numbers[one] = np.arange(k * count, (k + 1) * count).reshape(self.shape)
-        for one, (key, link) in (
-            (one, each) for one in PARITIES for each in self.links[one].items()
-        ):
-            other, base = _halves(one[0] + key[0], one[1] + key[1])
-            some = link != 0.0
-            ends.append((numbers[one][some], shifted(numbers[other], base)[some], link[some]))
-        tail, head, link = map(np.concatenate, zip(*ends, strict=True))
+        heads, links = [], []
+        for key in self.links[0, 0]:
+            beside = ((one, _halves(one[0] + key[0], one[1] + key[1])) for one in PARITIES)
+            heads.append(_flat({one: shifted(numbers[of], base) for one, (of, base) in beside}))
+            links.append(_flat({one: self.links[one][key] for one in PARITIES}))
         diagonal = _flat(self.diagonal)
-        return Pools(tail, head, link, np.where(diagonal > _LEAST, diagonal, 0.0))
+        open_links = np.where(diagonal > _LEAST, diagonal, 0.0)
+        return Pools(np.array(heads), np.array(links), open_links)
 
     def relaxes_alone(self, entirely: bool) -> None:
         """Free what only coarser grids are made from, and iterations on the finest one need."""
@@ -288,13 +288,13 @@ class Cycle:
     """
 
     def __init__(self, links: Parts, diagonal: Array) -> None:
-        self.grids, self._pools = [_Grid(links, diagonal)], dict[int, Pools]()
+        self.grids, self._pools = [_Grid(links, diagonal)], None
         while max(self.grids[-1].shape[1:]) > COARSEST:
             coarser = self.grids[-1].coarser()
             self.grids[-1].relaxes_alone(len(self.grids) > 1)
             self.grids.append(_Grid(*coarser))
-            if not self._pools and coarser[1][0].size <= _WITH_POOLS:
-                self._pools[len(self.grids) - 1] = self.grids[-1].pools()
+            if len(self.grids) == _WITH_POOLS + 1:
+                self._pools = self.grids[-1].pools()
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
     def __call__(self, right: Parts, depth: int = 0) -> Parts:
@@ -304,11 +304,10 @@ class Cycle:
             right: Right side by parity, in single precision.
             depth: Number of the grid, 0 for the finest.
         """
-        grid, pools = self.grids[depth], self._pools.get(depth)
+        grid, pools = self.grids[depth], self._pools if depth == _WITH_POOLS else None
         if pools:
             changes, left = pools.changes(_flat(right))
-            for one, part in zip(PARITIES, np.split(left, 4), strict=True):
-                right[one][:] = part.reshape(grid.shape)
+            self._put(left, right)
         coarse = grid.before(right)
         change = np.empty_like(coarse)
         if depth + 1 < len(self.grids):
@@ -321,11 +320,14 @@ class Cycle:
         grid.after(right, change)
         found = grid.found.own
         if pools:
-            for one, part in zip(
-                PARITIES, np.split(pools.balanced(_flat(found), changes), 4), strict=True
-            ):
-                found[one][:] = part.reshape(grid.shape)
+            self._put(pools.balanced(_flat(found), changes), found)
         return found
+
+    @staticmethod
+    def _put(values: Array, parts: Parts) -> None:
+        """Write values of cells, in the order of their parities, into parts."""
+        for one, part in zip(PARITIES, np.split(values, len(PARITIES)), strict=True):
+            parts[one][:] = part.reshape(parts[one].shape)
 
 
 def _flat(parts: Parts) -> NDArray[np.floating]:

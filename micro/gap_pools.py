@@ -10,13 +10,16 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph, linalg
 
 from patchlaw.support import Array
-from patchlaw.support.arrays import Indices
+
+Numbers: TypeAlias = NDArray[np.integer]
 
 _NARROW = 0.1
 """Links of a pool to others and to terminals, over the sum of all links of its cells, below which
@@ -28,31 +31,24 @@ class Pools:
     """Pools of cells, which grow along their widest links until narrow ones alone lead out.
 
     Args:
-        tail: Cells that links leave, each link seen from both of its ends, shape (m,).
-        head: Cells that they lead to, shape (m,).
-        link: The links, shape (m,).
-        diagonal: Sums of all links of cells, with those to terminals; 0 in closed cells.
+        head: Neighbours of m cells, shape (k, m).
+        link: Links to them, shape (k, m).
+        diagonal: Sums of all links of cells, with those to terminals; 0 in closed ones, shape (m,).
     """
 
-    def __init__(self, tail: Indices, head: Indices, link: Array, diagonal: Array) -> None:
-        cells, is_open = np.flatnonzero(diagonal), (diagonal[tail] > 0.0) & (diagonal[head] > 0.0)
-        tail, head, link = tail[is_open], head[is_open], link[is_open]
-        terminals = np.maximum(diagonal - np.bincount(tail, link, len(diagonal)), 0.0)
-        number = np.cumsum(diagonal > 0.0) - 1
-        links = _matrix(link, number[tail], number[head], len(cells))
-        pools, self._count = _grown(links, terminals[cells], diagonal[cells])
-        self._of = np.full(len(diagonal), self._count)  # closed cells are in one of their own
-        self._of[cells] = pools
-        leaves = self._of[tail] != self._of[head]
-        tail, head, link = tail[leaves], head[leaves], link[leaves]
-        rows = np.concatenate((cells, tail, tail))
-        columns = self._of[np.concatenate((cells, tail, head))]
-        entries = np.concatenate((terminals[cells], link, -link))
-        shape = len(diagonal), self._count
-        self._out = sparse.coo_matrix((entries, (rows, columns)), shape).tocsr()
-        self._into = self._out.T.tocsr()
-        among = _matrix(entries, self._of[rows], columns, self._count)
-        among += sparse.diags(1e-12 * among.diagonal() + 1e-300)  # rounding may leave no way out
+    def __init__(self, head: Numbers, link: Array, diagonal: Array) -> None:
+        link = np.where(diagonal[head] > 0.0, link, 0.0)
+        terminals = np.maximum(diagonal - link.sum(axis=0), 0.0)
+        self._of, self._count = _grown(head, link, terminals, diagonal)
+        side, tail = np.nonzero((self._of[head] != self._of) & (link != 0.0))
+        head, link, ends = head[side, tail], link[side, tail], np.flatnonzero(terminals)
+        rows = np.concatenate((ends, tail, tail))
+        columns = self._of[np.concatenate((ends, tail, head))]
+        entries = np.concatenate((terminals[ends], link, -link))
+        self._out = _matrix(entries, rows, columns, (len(diagonal), self._count))
+        among = _matrix(entries, self._of[rows], columns, (self._count, self._count))
+        own = among.diagonal()  # 0 of closed cells alone, but for rounding
+        among += sparse.diags(np.where(own > 0.0, 1e-12 * own, 1.0))
         self._factors = linalg.splu(among.tocsc())
 
     def changes(self, residual: NDArray[np.floating]) -> tuple[Array, Array]:
@@ -61,7 +57,7 @@ class Pools:
         Args:
             residual: What does not balance in cells.
         """
-        sums = np.bincount(self._of, residual, self._count + 1)[:-1]
+        sums = np.bincount(self._of, residual, self._count)
         changes = self._factors.solve(sums)
         return changes, residual - self._out @ changes
 
@@ -72,39 +68,51 @@ class Pools:
             found: Potentials of cells for the residual that the changes leave.
             changes: See `changes`.
         """
-        changes = changes - self._factors.solve(self._into @ found)
-        return found + np.append(changes, 0.0)[self._of]
+        changes = changes - self._factors.solve(self._out.T @ found)
+        return found + changes[self._of]
 
 
-def _grown(links: sparse.csr_matrix, terminals: Array, sums: Array) -> tuple[Indices, int]:
+def _grown(head: Numbers, link: Array, terminals: Array, sums: Array) -> tuple[Numbers, int]:
     """Return the number of the pool of each cell, and how many there are.
 
     Args:
-        links: Links between cells.
-        terminals: Their links to terminals.
+        head: See `Pools`.
+        link: Likewise.
+        terminals: Links of cells to terminals.
         sums: Sums of all links of cells.
     """
-    found = np.arange(len(sums))
-    while links.nnz:
-        count, starts = len(sums), links.indptr[:-1]
-        some = np.flatnonzero(np.diff(links.indptr))
-        widest, out = np.zeros(count), terminals.copy()
-        widest[some] = np.maximum.reduceat(links.data, starts[some])
-        out[some] += np.add.reduceat(links.data, starts[some])
-        grows = (out > _NARROW * sums) & (widest > 0.0)
-        if not grows.any():
-            break
-        tail = np.repeat(np.arange(count), np.diff(links.indptr))
-        along = grows[tail] & (links.data == widest[tail])
-        joined = _matrix(np.ones(along.sum()), tail[along], links.indices[along], count)
-        count, own = csgraph.connected_components(joined, directed=False)
-        found, tail, head = own[found], own[tail], own[links.indices]
+    cells = np.arange(len(sums))
+    to = np.where(sums > 0.0, head[link.argmax(axis=0), cells], int(sums.argmin()))
+    found: Numbers = _joined(cells, to, len(sums))  # closed cells with each other
+    own, some = found, link.ravel() != 0.0
+    tail, head = np.broadcast_to(cells, link.shape).ravel()[some], head.ravel()[some]
+    link = link.ravel()[some]
+    while True:
+        count = int(own.max()) + 1
         terminals, sums = (np.bincount(own, one, count) for one in (terminals, sums))
-        links = _matrix(
-            links.data[tail != head], *(one[tail != head] for one in (tail, head)), count
-        )
-    return found, len(sums)
+        tail, head = own[tail], own[head]
+        leads = tail != head
+        links = _matrix(link[leads], tail[leads], head[leads], (count, count))
+        each, link, head = np.diff(links.indptr), links.data, links.indices
+        tail, linked, widest = np.repeat(np.arange(count), each), each > 0, np.zeros(count)
+        if len(link):
+            widest[linked] = np.maximum.reduceat(link, links.indptr[:-1][linked])
+        out = terminals + np.bincount(tail, link, count)
+        along = ((out > _NARROW * sums) & (widest > 0.0))[tail] & (link == widest[tail])
+        if not along.any():
+            return found, count
+        own = _joined(tail[along], head[along], count)
+        found = own[found]
 
 
-def _matrix(entries: Array, rows: Indices, columns: Indices, size: int) -> sparse.csr_matrix:
-    return sparse.coo_matrix((entries, (rows, columns)), (size, size)).tocsr()
+def _joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
+    """Return a number for each of so many nodes that those share which links join."""
+    links = _matrix(np.ones(len(tail)), tail, head, (count, count))
+    joined: Numbers = csgraph.connected_components(links, directed=False)[1]
+    return joined
+
+
+def _matrix(
+    entries: Array, rows: Numbers, columns: Numbers, shape: tuple[int, int]
+) -> sparse.csr_matrix:
+    return sparse.coo_matrix((entries, (rows, columns)), shape).tocsr()
