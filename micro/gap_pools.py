@@ -84,12 +84,12 @@ def _grown(head: Numbers, link: Array, terminals: Array, sums: Array) -> tuple[N
     cells = np.arange(len(sums))
     to = np.where(sums > 0.0, head[link.argmax(axis=0), cells], int(sums.argmin()))
     found: Numbers = _joined(cells, to, len(sums))  # closed cells with each other
-    own, some = found, link.ravel() != 0.0
-    tail, head = np.broadcast_to(cells, link.shape).ravel()[some], head.ravel()[some]
-    link = link.ravel()[some]
+    own, sides = found, np.nonzero(link)
+    tail: Numbers = sides[1]
+    head, link = head[sides], link[sides]
     while True:
         count = int(own.max()) + 1
-        terminals, sums = (np.bincount(own, one, count) for one in (terminals, sums))
+        terminals, sums = (np.bincount(own, one, count) * 1.0 for one in (terminals, sums))
         tail, head = own[tail], own[head]
         leads = tail != head
         links = _matrix(link[leads], tail[leads], head[leads], (count, count))
