@@ -7,7 +7,7 @@ grids have the operator that follows. Pools of fluid between contact that no coa
 or that are linked to one by a narrow link alone, would be lost so: cells have a small link to both
 sides besides (`_SHARE`), by which a coarse cell in contact can stand for the pool beside it.
 
-On one coarse grid pools are corrected besides (`gap_pools`).
+On one coarse grid pools can be corrected besides (`gap_pools`).
 
 One cycle, in single precision, preconditions `gap_iteration`. Flows in several directions are
 solved together, as arrays whose first axis is the direction.
@@ -288,14 +288,20 @@ class Cycle:
     """
 
     def __init__(self, links: Parts, diagonal: Array) -> None:
-        self.grids, self._pools = [_Grid(links, diagonal)], None
+        self.grids = [_Grid(links, diagonal)]
+        self._pools: Pools | None = None
         while max(self.grids[-1].shape[1:]) > COARSEST:
             coarser = self.grids[-1].coarser()
-            self.grids[-1].relaxes_alone(len(self.grids) > 1)
+            self.grids[-1].relaxes_alone(len(self.grids) - 1 not in (0, _WITH_POOLS))
             self.grids.append(_Grid(*coarser))
-            if len(self.grids) == _WITH_POOLS + 1:
-                self._pools = self.grids[-1].pools()
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
+
+    def with_pools(self) -> bool:
+        """Let cycles correct pools, too; return whether they do so from here on."""
+        if self._pools or len(self.grids) <= _WITH_POOLS:
+            return False
+        self._pools = self.grids[_WITH_POOLS].pools()
+        return True
 
     def __call__(self, right: Parts, depth: int = 0) -> Parts:
         """Return an approximate solution, which is overwritten next time.
