@@ -39,15 +39,14 @@ def main():
                 rows.append((separation / last, exact, error, stated, grid))
     place, exact, error, stated, grid = np.array(rows).T
     some = exact > 0.0
-    print(
-        "separation, of first touch | flows | stated ≥ true, with the grid's | true | stated, of T"
-    )
+    print("separation, of first touch | flows | stated ≥ true, with grid's | true | stated, of T")
     for low, high in ((0.0, 0.15), (0.15, 0.25), (0.25, 0.4), (0.4, 1.0), (0.0, 1.0)):
         here = some & (place >= low) & (place < high)
         true, said, both = (one[here] / exact[here] for one in (error, stated, stated + grid))
         print(
             f"{low:.2f} to {high:.2f} | {here.sum()} | {np.mean(said >= true):.3f},"
-            f" {np.mean(both >= true):.3f} | median {np.median(true):.4f}, 95 % {np.quantile(true, 0.95):.4f}, {true.max():.3f}"
+            f" {np.mean(both >= true):.3f} | median {np.median(true):.4f},"
+            f" 95 % {np.quantile(true, 0.95):.4f}, {true.max():.3f}"
             f" | median {np.median(said):.4f}"
         )
 
