@@ -38,7 +38,8 @@ FLOORS = {
         "asperities contact_state meshes",
     ],
     "micro": [
-        "closed_forms gap_multigrid",
+        "closed_forms gap_pools",
+        "gap_multigrid",
         "gap_iteration",
         "transport",
         "boundary_elements model",

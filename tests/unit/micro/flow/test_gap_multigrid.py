@@ -121,6 +121,22 @@ def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
         assert gap_iteration.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
 
 
+def test_pools_behind_narrow_links_take_no_more_iterations(monkeypatch):
+    """Where coarser grids alone stood for pools, these took 53."""
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 40)
+    random, pitch, count = np.random.default_rng(2), 13, 8
+    gap, inside = np.zeros(2 * [pitch * count]), np.arange(pitch * count) % pitch < pitch - 1
+    gap[np.ix_(inside, inside)] = random.uniform(0.5, 1.0, 2 * [inside.sum()])
+    for i, j in np.ndindex(count, count):
+        x, y, (place, other) = pitch * i, pitch * j, random.integers(0, pitch - 1, 2)
+        narrow = 10.0 ** random.uniform(-2.0, -0.5, 2)
+        gap[x + pitch - 1, y + place], gap[x + other, y + pitch - 1] = narrow
+    ((_, found),) = gap_iteration.cell_flows(gap, (1.0, 1.0), (0,), periodic=True)
+    monkeypatch.setattr(transport, "_MOST_FACTORISED", gap.size)
+    exact = gap_flows(gap, (1.0, 1.0), axes=(0,), periodic=True)[0].total
+    assert found == pytest.approx(exact, rel=1e-8, abs=0)
+
+
 def test_thin_maps_are_factorised(monkeypatch):
     monkeypatch.delattr(gap_iteration, "cell_flows")
     for flow in gap_flows(np.full((3, 4000), 1e-3), (0.003, 4.0), periodic=True):
