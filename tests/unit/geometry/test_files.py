@@ -34,15 +34,6 @@ def test_text_matrices_have_rows_along_x(tmp_path, suffix, separator):
     )
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32", "int16"])
-def test_numpy_arrays(tmp_path, dtype):
-    file = tmp_path / "scan.npy"
-    heights = (100 * HEIGHTS).astype(dtype)
-    np.save(file, heights)
-    found = read_surface(str(file), lengths=(250.0, 200.0))
-    np.testing.assert_array_equal(found.heights, heights)
-
-
 @pytest.mark.parametrize("seed", [None, 0, 1])
 def test_point_lists_come_in_any_order(tmp_path, seed):
     order = None if seed is None else np.random.default_rng(seed).permutation(20)
@@ -143,21 +134,6 @@ def test_missing_files_and_folders(tmp_path):
         read_surface(tmp_path / "gone.npy", lengths=SIDES)
     with pytest.raises(InputError, match=rf"{tmp_path}: is a folder \(allowed: a file\)"):
         read_surface(tmp_path, lengths=SIDES)
-
-
-def test_pickled_objects_are_never_loaded(tmp_path):
-    file = tmp_path / "scan.npy"
-    np.save(file, np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    with pytest.raises(InputError, match=r"readable numpy array: .*Python objects"):
-        read_surface(file, lengths=SIDES)
-
-
-@pytest.mark.parametrize("array", [HEIGHTS + 1j, HEIGHTS.astype(str)])
-def test_arrays_of_other_kinds_are_refused(tmp_path, array):
-    file = tmp_path / "scan.npy"
-    np.save(file, array)
-    with pytest.raises(InputError, match=r"scan\.npy: not an array of real numbers"):
-        read_surface(file, lengths=SIDES)
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])

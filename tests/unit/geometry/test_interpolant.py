@@ -59,24 +59,6 @@ def test_periodic_interpolant_is_the_periodic_spline():
     np.testing.assert_allclose(h(px, py), exact, atol=1e-12)  # padding error 1e-16, rounding
 
 
-@pytest.mark.parametrize("sign, corner", [(1.0, (1.0, 2.0)), (-1.0, (0.0, 0.0))])
-def test_maximum_of_a_plane_is_its_corner(sign, corner):
-    blank = Surface(heights=np.zeros((6, 5)), lengths=(1.0, 2.0))
-    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
-    surface = Surface(heights=sign * (x + y), lengths=blank.lengths)
-    assert surface.highest_point == pytest.approx(corner, abs=1e-12)  # rounding
-    assert surface.highest == pytest.approx(sign * sum(corner), abs=1e-12)
-
-
-def test_maximum_on_one_side_of_the_border():
-    blank = Surface(heights=np.zeros((10, 10)), lengths=(1.0, 1.0))
-    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
-    surface = Surface(heights=x - (y - 0.43) ** 2, lengths=(1.0, 1.0))
-    # the height is exact to rounding, the place to its square root
-    assert surface.highest == pytest.approx(1.0, abs=1e-13)
-    assert surface.highest_point == pytest.approx((1.0, 0.43), abs=1e-7)
-
-
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("seed", [0, 1, 19, 73])  # the last two: not below the best fine sample
 def test_maximum_of_noise_against_dense_sampling(seed, periodic):

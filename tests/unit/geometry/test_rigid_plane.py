@@ -61,16 +61,3 @@ def test_a_plane_without_a_centre_waits_for_its_face():
     for placed in (lambda: tilted.at(x, y), lambda: level.moment(x, y, force)):
         with pytest.raises(InputError, match=r"the middle of its face.*centre = \(xc, yc\)"):
             placed()
-
-
-@pytest.mark.parametrize(
-    ("approach", "tilt", "problem"),
-    [
-        (np.nan, (0.0, 0.0), "approach = nan: must be a finite number"),
-        (1.0, (0.0, np.inf), "tilt .* must be 2 numbers"),
-        (1.0, (0.0,), "tilt .* must be 2 numbers"),
-    ],
-)
-def test_refuses_what_is_no_plane(approach, tilt, problem):
-    with pytest.raises(InputError, match=problem):
-        RigidPlane.above(SQUARE, approach, tilt)

@@ -17,35 +17,6 @@ def top_of(element="Q1", cells=(6, 4, 1), grid=(2, 2)):
     return TopNodes(RoughFace.of_block(block), PatchGrid(grid=grid, lengths=(3.0, 2.0)))
 
 
-@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
-def test_areas_tile_the_top(element):
-    top = top_of(element)
-    triangles, area = top.triangles
-    assert top.area.sum() == pytest.approx(6.0, rel=1e-12)
-    assert area.sum() == pytest.approx(6.0, rel=1e-12)
-    every = np.ones(len(top.x), dtype=bool)
-    assert top.covered_area(every, top.area, 0.0 * top.x) == pytest.approx(6.0, rel=1e-12)
-    x, y = top.with_ghosts(top.x, top.y)
-    # edges lie opposite the corners
-    a, b = triangles[:, 1], triangles[:, 2]
-    np.testing.assert_allclose(top.edges[:, 0], np.hypot(x[a] - x[b], y[a] - y[b]), rtol=1e-12)
-
-
-def test_nodes_on_borders_are_shared_equally():
-    top = top_of()
-    for x, y, expected in [
-        (0.5, 0.5, [1.0, 0.0, 0.0, 0.0]),
-        (0.0, 2.0, [0.0, 1.0, 0.0, 0.0]),
-        (1.5, 0.5, [0.5, 0.0, 0.5, 0.0]),
-        (2.0, 1.0, [0.0, 0.0, 0.5, 0.5]),
-        (1.5, 1.0, [0.25, 0.25, 0.25, 0.25]),
-    ]:
-        at = np.isclose(top.x, x) & np.isclose(top.y, y)
-        assert at.sum() == 1
-        np.testing.assert_allclose(top.patch_sums(at.astype(float)), expected)
-    np.testing.assert_allclose(top.patch_means(top.x), [0.75, 0.75, 2.25, 2.25])
-
-
 @pytest.mark.parametrize("element", ["Q1", "P2"])
 def test_regions_are_joined_by_facets(element):
     top = top_of(element)

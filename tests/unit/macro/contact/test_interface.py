@@ -1,7 +1,5 @@
 """Interfaces in a user's problem: what they accept and refuse, tangents, options, failures."""
 
-import gc
-import weakref
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -397,15 +395,6 @@ def test_one_interface_in_two_problems(body):
             alone.indenter = RigidPlane(approach=approach)
             problem.solve()
             assert force == pytest.approx(alone.force, rel=1e-8)
-
-
-def test_problems_are_freed(body):
-    rough, problem = on_top(body)
-    problem.solve()
-    kept = weakref.ref(problem), weakref.ref(rough)
-    del problem, rough
-    gc.collect()
-    assert [each() for each in kept] == [None, None]
 
 
 def test_callables_are_what_the_package_of_external_operators_asks_for(body):

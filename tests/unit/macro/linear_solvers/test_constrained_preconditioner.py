@@ -9,7 +9,6 @@ from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers.constrained import (
     TOLERANCE,
-    ConstrainedPreconditioner,
     ConstrainedSolver,
     contact_tolerance,
 )
@@ -27,33 +26,6 @@ def pressed_dofs(block, half):
     places = block.space.tabulate_dof_coordinates()
     held = (places[:, 2] > -1e-9) & (np.abs(places[:, :2] - 0.5).max(axis=1) < half)
     return 3 * np.flatnonzero(held) + 2
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("motions", [0, 1])
-@pytest.mark.parametrize("layers", [0, 1, 2])
-def test_it_is_symmetric_and_positive(layers, motions):
-    block = block_of((4, 4, 3))
-    dofs, count = pressed_dofs(block, 0.3), block.dofs
-    q = np.full((len(dofs), motions), len(dofs) ** -0.5)
-    mended = ConstrainedPreconditioner(block.stiffness, block.solver.pc, layers)
-    mended.constrain(np.arange(7), np.zeros((7, 0)))  # forgotten by the next
-    mended.constrain(dofs, q)
-    free = np.setdiff1d(np.arange(count), dofs)
-    ways = np.zeros((count, len(free) + motions))  # an orthonormal basis of what is left
-    ways[free, np.arange(len(free))] = 1.0
-    ways[dofs, len(free) :] = q
-    found, x = np.empty_like(ways), block.stiffness.createVecRight()
-    y = x.duplicate()
-    for column, way in enumerate(ways.T):
-        x.array[:] = way
-        mended.apply(None, x, y)
-        found[:, column] = y.array_r
-    inside = ways.T @ found
-    # nothing leaves what is left, to rounding
-    np.testing.assert_allclose(ways @ inside, found, atol=1e-12 * np.abs(found).max())
-    np.testing.assert_allclose(inside, inside.T, atol=1e-12 * np.abs(inside).max())
-    assert np.linalg.eigvalsh(inside).min() > 0.0
 
 
 @pytest.mark.long

@@ -82,14 +82,3 @@ def test_tables_of_a_mesh_fit_its_space(element):
     places = space.tabulate_dof_coordinates()[compat.cell_nodes(space)[:, :corners]]
     np.testing.assert_allclose(places, mesh.geometry.x[table], atol=1e-14)  # round-off
     assert isinstance(fem.Function(space).x.array, np.ndarray)
-
-
-@pytest.mark.parametrize("size", [1.0, 3.0, 3e-9])
-def test_refined_blocks_have_their_own_size(size):
-    refined = RefinedShape(
-        interface=(size, size), height=size, places=np.array([[0.5 * size, 0.5 * size]]),
-        fine=0.3 * size, coarse=0.5 * size, element="P2",
-    )  # fmt: skip
-    points = block_mesh(refined, MPI.COMM_SELF).mesh.geometry.x
-    np.testing.assert_allclose(points.min(axis=0), [0.0, 0.0, -size], atol=1e-12 * size)
-    np.testing.assert_allclose(points.max(axis=0), [size, size, 0.0], atol=1e-12 * size)

@@ -21,14 +21,6 @@ def curve(model, approaches, patches=PATCHES, **options):
 
 
 @every_model
-def test_name_and_kind(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    assert model.name == name
-    assert (not model.pairs.circular) == name.startswith("elliptic")
-    assert model.pairs.half_space == (not name.endswith("independent"))
-
-
-@every_model
 def test_single_asperity_is_hertz(summits, name):
     one = summits(0.3, 0.7, z=-1e-3, major=0.4, minor=0.1, highest=0.0)
     model = AsperityModel(name, one, contact_modulus=E_STAR)
