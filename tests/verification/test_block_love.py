@@ -70,18 +70,3 @@ def test_distance_to_love_halves_when_the_block_doubles():
     small, large = (on_a_block("Q2", 4, width=width) for width in (2.0, 4.0))
     # the leading term is inverse to the width; the mesh adds 1 % of the displacement to both
     assert (exact - small) / (exact - large) == pytest.approx(2.0, abs=0.2)
-
-
-@pytest.mark.slow
-def test_distance_to_love_halves_with_the_mesh():
-    exact = half_space_displacements(interface_of(block_of(cells=(1, 1, 1)), (1, 1)).patches)
-    coarse, fine = (
-        abs(
-            extrapolated(
-                *(on_a_block("Q1", 4 * k, width=width, fineness=k) for width in (2.0, 4.0))
-            )
-            - exact
-        )
-        for k in (1, 2)
-    )
-    assert fine < 0.6 * coarse  # between first order (steps of pressure) and second
