@@ -95,16 +95,3 @@ def test_coincident_summits_share_the_force_of_one(name, count, share):
         share, rel=tolerance
     )
     assert all_of_them.overlapping_contacts == count * (count - 1)
-
-
-@both_shapes
-def test_kernel_is_exact_before_merging(name):
-    # Circles of radius a, r apart, are within reach of each other's summit from a = 0.797 r on.
-    model = AsperityModel(name, CASES["two equal"], contact_modulus=E_STAR)
-    states = [pressed(model, approach) for approach in np.linspace(1e-3, 0.03, 100)]
-    reach = np.array([state.ellipses.semi_axes[0, 0] for state in states]) / 0.04
-    overlapping_contacts = np.array([state.overlapping_contacts for state in states])
-    assert np.all(overlapping_contacts[reach < 0.796] == 0) and np.all(
-        overlapping_contacts[reach > 0.798] == 2
-    )
-    assert reach.min() < 0.5 and reach.max() > 0.85  # the sweep passes the place

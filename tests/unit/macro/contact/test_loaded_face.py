@@ -1,14 +1,11 @@
 """Samples, loads and means of the interface."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
-from patchlaw.macro.contact.face_laws import by_patch
 from patchlaw.support import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
@@ -56,17 +53,6 @@ def test_margin_is_free_of_traction():
     assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((0, 2, 0, 1), abs=1e-12)
 
 
-def test_laws_see_the_samples_of_their_own_patch():
-    interface = make((3, 2))
-    laws = [partial(np.full_like, fill_value=float(i)) for i in range(6)]
-    for mode in ("patchwise", "pointwise"):
-        sampling = interface.sampling(mode)
-        closure = np.zeros(len(sampling.weight))
-        np.testing.assert_array_equal(by_patch(laws, sampling.patch, closure), sampling.patch)
-        expected = np.arange(6) * interface.patches.area
-        np.testing.assert_allclose(sampling.patch_sums(sampling.patch * 1.0), expected, rtol=NODES)
-
-
 @pytest.mark.parametrize("grid", [(2, 1), (3, 2)])
 def test_compliance_of_unequal_patches_is_that_of_direct_solutions(grid):
     """Patches that reach beyond the top are cut; A_i C_ij is symmetric, C_ij is not."""
@@ -99,10 +85,3 @@ def test_patches_beyond_a_small_top_are_refused():
     assert make((10, 10), (1e-3, 1e-3), **small).areas.sum() == pytest.approx(1e-6, rel=NODES)
     with pytest.raises(InputError, match="patches reach beyond"):
         make((10, 10), (1.2e-3, 1e-3), **small)
-
-
-def test_unknown_mode_is_refused():
-    with pytest.raises(
-        InputError, match=r"'cellwise': unknown interface \(allowed: patchwise, pointwise\)"
-    ):
-        make().sampling("cellwise")

@@ -8,13 +8,7 @@ from petsc4py import PETSc
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import multigrid
-from patchlaw.macro.linear_solvers.multigrid import (
-    block_rows,
-    coarser_grids,
-    galerkin,
-    lattice_of,
-    transfers,
-)
+from patchlaw.macro.linear_solvers.multigrid import coarser_grids, galerkin, lattice_of, transfers
 
 
 def make(sides="free", **changes):
@@ -71,9 +65,3 @@ def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
     monkeypatch.setattr(multigrid, "_NODES_AT_ONCE", 7)
     pieces = dense(galerkin(*products))
     np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
-
-
-def test_other_types_of_matrices_are_refused():
-    with pytest.raises(PETSc.Error):
-        with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
-            pass

@@ -17,24 +17,11 @@ def user_options():
             database.delValue(name)
 
 
-def test_defaults_are_put_in_and_taken_out(user_options):
-    with default_options("patchlaw_test_", {"ksp_rtol": 1e-3}):
-        assert user_options.getReal("ksp_rtol") == 1e-3
-    assert not user_options.hasName("ksp_rtol")
-
-
 def test_defaults_are_taken_out_after_an_error(user_options):
     with pytest.raises(RuntimeError, match="boom"):
         with default_options("patchlaw_test_", {"ksp_rtol": 1e-3}):
             raise RuntimeError("boom")
     assert not user_options.hasName("ksp_rtol")
-
-
-def test_the_users_options_win_and_stay(user_options):
-    user_options["ksp_rtol"] = 0.5
-    with default_options("patchlaw_test_", {"ksp_rtol": 1e-3}):
-        assert user_options.getReal("ksp_rtol") == 0.5
-    assert user_options.getReal("ksp_rtol") == 0.5
 
 
 def test_a_prefix_is_mandatory():

@@ -9,7 +9,6 @@ from petsc4py import PETSc
 from patchlaw.geometry import BlockShape, RefinedShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import selection as block_solver
-from patchlaw.macro.linear_solvers.selection import smoothing
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 COARSE = {"places": np.array([[0.5, 0.5]]), "fine": 0.3, "coarse": 0.5}
@@ -96,33 +95,3 @@ def test_the_users_smoother_wins(options):
     solver = make("P2*", 0.3).solver.pc
     assert solver.getMGSmoother(1).pc.getType() == "sor"
     assert solver.getMGCoarseSolve().pc.getType() == "jacobi"
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("element", ["P1", "P2*"])
-def test_all_solvers_find_the_same(options, element):
-    fields = []
-    for kind in (None, "gamg", "cholesky"):
-        if kind:
-            options(pc_type=kind)
-        block = make(element, 0.3)
-        load = block.stiffness.createVecRight()
-        load.set(1.0)
-        load.pointwiseMult(load, block.free)
-        fields.append(block.solve(load).x.array)
-    for other in fields[:2]:
-        # residuals of 1e-10 through a condition number of about 1e3
-        np.testing.assert_allclose(other, fields[2], atol=1e-7 * np.abs(fields[2]).max())
-
-
-def test_smoothing_follows_the_stiffness_of_the_volume():
-    assert smoothing(0.3, hexahedral=True) == {} != smoothing(0.45, hexahedral=True)
-    steps = [
-        smoothing(ratio, hexahedral=False)["mg_levels_ksp_max_it"] for ratio in (0, 0.49, 0.4999)
-    ]
-    assert steps == [4, 7, 8]
-    ranges = [
-        smoothing(ratio, hexahedral=True)["mg_levels_ksp_chebyshev_esteig"]
-        for ratio in (0.46, 0.49, 0.4999)
-    ]
-    assert ranges == ["0,0.04,0,1.05", "0,0.01,0,1.05", "0,0.005,0,1.05"]

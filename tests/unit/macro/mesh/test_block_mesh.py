@@ -7,7 +7,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, RefinedShape
-from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from patchlaw.macro import BOTTOM, SIDES, TOP, block_mesh, compat
 from patchlaw.support import InputError
 
 
@@ -55,17 +55,6 @@ def test_planes_say_where_nodes_are(element):
     block = block_mesh(shape, MPI.COMM_SELF)
     places = [ticks[block.planes[:, k]] for k, ticks in enumerate(shape.ticks)]
     np.testing.assert_array_equal(block.mesh.geometry.x, np.stack(places, axis=1))
-
-
-def test_compiled_forms_serve_lattices_and_meshes_of_gmsh():
-    square = {"interface": (1.0, 1.0), "height": 1.0, "element": "P1"}
-    shapes = (
-        BlockShape(cells=(1, 1, 1), **square),
-        RefinedShape(places=np.zeros((1, 2)), fine=0.5, coarse=0.5, growth=1.0, **square),
-    )
-    material = Material(young_modulus=1.0, poisson_ratio=0.3)
-    lattice, refined = (Block(block_mesh(shape, MPI.COMM_SELF), material) for shape in shapes)
-    assert lattice.form.signature() == refined.form.signature()
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

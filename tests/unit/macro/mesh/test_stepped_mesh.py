@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from benchmarks.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
+from benchmarks.stepped import SteppedShape, stepped_mesh
 from patchlaw import InputError
 from patchlaw.geometry import RefinedShape, Spectrum, Surface, synthesise
 from patchlaw.macro.mesh.block import move_onto
@@ -25,20 +25,6 @@ PLANES = {"held": (0, 1.5), "below": (2, -1.5)}
 ROUGH = synthesise(
     Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.2, seed=2), grid=(64, 64), lengths=(1.0, 1.0)
 )
-
-
-def test_roughness_moves_the_block_alone():
-    flat = stepped_mesh(SHAPE, PLANES, COMM).mesh.geometry.x
-    mesh, quality = rough_stepped_mesh(SHAPE, PLANES, ROUGH, COMM)
-    moved = mesh.mesh.geometry.x
-    np.testing.assert_array_equal(moved[:, :2], flat[:, :2])
-    below = flat[:, 2] <= -0.75 + 1e-12
-    assert below.any()
-    np.testing.assert_array_equal(moved[below], flat[below])
-    top = np.abs(flat[:, 2]) < 1e-12
-    rise = ROUGH.height_at(*flat[top, :2].T) - ROUGH.mean_height
-    np.testing.assert_allclose(moved[top, 2], rise, atol=1e-12)
-    assert 0.3 < quality.thinnest < 1.0
 
 
 def test_roughness_fades_beside_its_rectangle():
