@@ -1,10 +1,14 @@
+"""Files of heights: what they hold comes back, and any other content is refused in one line."""
+
 import os
 import pickle
+import warnings
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
 
-from benchmarks.height_files import Bomb, header
+from benchmarks.height_files import Bomb, anything, header, read, sides
 from patchlaw import InputError
 from patchlaw.geometry import read_surface
 
@@ -306,3 +310,20 @@ def test_rounding_is_no_roughness(tmp_path):
     assert np.ptp(surface.heights) == 0.0 and surface.source.endswith(", level but for rounding")
     np.save(tmp_path / "h.npy", 1.0 + 1e-12 * HEIGHTS)
     assert np.ptp(read_surface(tmp_path / "h.npy", lengths=SIDES).heights) > 1e-13
+
+
+@settings(
+    max_examples=100,
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+@given(anything, sides)
+def test_files_of_any_content(tmp_path_factory, file, lengths):
+    suffix, content = file
+    path = tmp_path_factory.getbasetemp() / f"heights{suffix}"
+    path.write_bytes(content)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(path, lengths) in ("read", "refused")

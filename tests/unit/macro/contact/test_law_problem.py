@@ -22,6 +22,7 @@ from patchlaw.macro import (
     compat,
     write_fields,
 )
+from patchlaw.macro.contact.pressed_plane import first_touch
 from patchlaw.support import NotConverged
 
 Spring = partial(PowerLaw, k=1e3, power=1.0)
@@ -223,3 +224,17 @@ def test_laws_together_are_the_laws_one_by_one(interface, mode):
     )
     assert one.approach == pytest.approx(other.approach, rel=1e-13)
     np.testing.assert_allclose(one.patch_force, other.patch_force, rtol=1e-12)
+
+
+NO_FORCE = Control(force=0.0)
+
+
+@pytest.mark.parametrize("at", [-3.0, -1e-9, 0.0, 1e-12, 0.25, 40.0])
+def test_first_touch_is_found_to_rounding(at):
+    found = first_touch(lambda approach: approach > at, NO_FORCE, 1.0)
+    assert found == pytest.approx(at, rel=1e-15, abs=1e-300)
+
+
+def test_nothing_to_touch():
+    with pytest.raises(NotConverged, match=r"NO_CONTACT .*no patch can be touched"):
+        first_touch(lambda _approach: False, NO_FORCE, 1.0)

@@ -1,11 +1,12 @@
-"""Samples, loads and means of the interface."""
+"""Samples, loads, means and regions of the interface."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
+from patchlaw.macro import Block, LoadedFace, Material, RoughFace, block_mesh, displacements_under
+from patchlaw.macro.contact.face_nodes import TopNodes
 from patchlaw.support import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
@@ -85,3 +86,26 @@ def test_patches_beyond_a_small_top_are_refused():
     assert make((10, 10), (1e-3, 1e-3), **small).areas.sum() == pytest.approx(1e-6, rel=NODES)
     with pytest.raises(InputError, match="patches reach beyond"):
         make((10, 10), (1.2e-3, 1e-3), **small)
+
+
+MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
+
+
+def top_of(element="Q1", cells=(6, 4, 1), grid=(2, 2)):
+    shape = BlockShape(interface=(3.0, 2.0), height=1.0, cells=cells, element=element)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), MATERIAL)
+    return TopNodes(RoughFace.of_block(block), PatchGrid(grid=grid, lengths=(3.0, 2.0)))
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_regions_are_joined_by_facets(element):
+    top = top_of(element)
+    near = np.hypot(top.x - 0.5, top.y - 0.5) < 0.6
+    far = np.hypot(top.x - 2.5, top.y - 1.5) < 0.3
+    assert top.regions(near & far)[1] == 0
+    assert top.regions(near)[1] == 1
+    assert top.regions(near | far)[1] == 2
+    assert top.regions(np.ones_like(near))[1] == 1
+    # two nodes with one between them do not touch each other
+    apart = np.isclose(top.y, 1.0) & (np.isclose(top.x, 0.5) | np.isclose(top.x, 1.5))
+    assert top.regions(apart)[1] == 2
