@@ -96,20 +96,6 @@ def test_no_force_is_first_touch(mode):
 
 @pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
-def test_way_down_is_the_way_up(mode):
-    pressed = uneven_block(mode)
-    forces = (1.0, 8.0, 1.0, 0.0, 8.0)
-    states = [pressed.solve(Control(force=force, tilt=None)) for force in forces]
-    for one, other in ((0, 2), (1, 4)):
-        # residuals of 1e-10 of the load
-        np.testing.assert_allclose(
-            states[one].patch_pressure, states[other].patch_pressure, atol=1e-8
-        )
-        np.testing.assert_allclose(states[one].tilt, states[other].tilt, rtol=1e-8)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("mode", MODES)
 def test_a_touch_that_is_rounding_holds_no_plane(mode):
     """From a few units of the last digit past first touch, the plane is that from any other."""
     pressed = uneven_block(mode)
