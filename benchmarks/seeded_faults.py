@@ -67,7 +67,7 @@ FAULTS = [
         "micro",
         "return total / (4.0 * a * b)",
         "return total / (4.0 * a * a)",
-        "unit/micro/closed_forms/test_love.py unit/micro/closed_forms/test_love.py",
+        "unit/micro/closed_forms/test_love.py",
     ),
     Fault(
         "micro",

@@ -76,7 +76,8 @@ def bent(depth):
     return TaggedMesh(mesh=mesh, facet_tags=tags)
 
 
-STEEL = Material(young_modulus=2e5, poisson_ratio=0.3)
+E, NU, STRAIN = 4000.0, 0.3, 2e-3
+STEEL = Material(young_modulus=E, poisson_ratio=NU)
 
 
 def make(sides="free", **changes):
@@ -115,7 +116,6 @@ def test_failed_solve_names_the_reason():
         block.solve(load)
 
 
-E, NU, STRAIN = 4000.0, 0.3, 2e-3
 HEATED = Loads(strain=((None, STRAIN),))
 HELD = (0.0, 0.0, 0.0)
 
