@@ -118,10 +118,6 @@ def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
     assert approach == pytest.approx([step.approach_mm for step in here.steps], rel=1e-10)
 
 
-def above(folder, **changes):
-    return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
-
-
 ROLLERS = [
     *HELD,
     *({"surface": name, "displacement": [0, "free", "free"]} for name in ("left", "right")),
@@ -317,15 +313,3 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
     upside = body(folder, "above", contact="left", supports=[{"surface": "top"}])
     with pytest.raises(InputError, match=r"counter_body.contact: does not face the body"):
         Run(Scene.from_dict({**PATCHES, "body": body(folder), "counter_body": upside}))
-
-
-SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
-
-
-@pytest.fixture(scope="module")
-def small(folder):
-    """Folder with a cube of few cells, and its mirror image above it."""
-    x, y, z = SMALL.ticks
-    write_box(folder / "small.msh", SMALL.ticks)
-    write_box(folder / "small_above.msh", (x, y, -z[::-1]))
-    return folder

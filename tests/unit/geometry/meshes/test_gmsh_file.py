@@ -19,17 +19,6 @@ def write(path, elements, points=CUBE, names=NAMES, **options):
     return write_msh2(path / "part.msh", points, elements, names, **options)
 
 
-@pytest.fixture(scope="module")
-def boxes(tmp_path_factory):
-    """Return the same mesh in all forms of gmsh's files."""
-    folder = tmp_path_factory.mktemp("boxes")
-    forms = [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)]
-    return [
-        read_gmsh_file(write_boxes(folder / f"{version}_{binary}.msh", version, binary))
-        for version, binary in forms
-    ]
-
-
 def test_nodes_may_have_gaps_and_no_cells(tmp_path):
     points = np.vstack([[[9.0, 9.0, 9.0]], CUBE])
     elements = [(4, 4, 1, np.add(cell, 1)) for cell in TWO] + [(2, 9, 1, [1, 2, 3])]
