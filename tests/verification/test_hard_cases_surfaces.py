@@ -88,12 +88,6 @@ def test_patches_with_nothing_in_them(tmp_path):
     assert laws.force_N[-1] == pytest.approx(forces[0], rel=1e-3)
 
 
-@pytest.mark.parametrize("shape", [(1, 32), (32, 1), (3, 3)])
-def test_too_few_heights_are_refused(shape, tmp_path):
-    with pytest.raises(InputError, match="at least 4 × 4 heights"):
-        history(**from_file(tmp_path, np.zeros(shape)))
-
-
 def test_noise_between_the_heights_is_told(tmp_path):
     # hard: a spline through white noise rises far above all heights, and approach counts from it
     noise = 3e-3 * np.random.default_rng(0).standard_normal((32, 32))

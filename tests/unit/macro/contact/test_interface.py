@@ -142,25 +142,12 @@ def test_faces_and_spaces_that_do_not_fit(body):
         Interface(body.space, body.tags, TOP, laws=LAW, indenter=PLANE, frame=down)
 
 
-def test_laws_and_planes_that_do_not_fit(body):
-    def make(**options):
-        return Interface(body.space, body.tags, TOP, **{"laws": LAW, "indenter": PLANE} | options)
-
-    with pytest.raises(InputError, match="every patch needs a law"):
-        make(laws=LAWS[:3], patches=PATCHES)
-    with pytest.raises(InputError, match="laws of patches need the patches"):
-        make(laws=LAWS)
-    with pytest.raises(InputError, match="the interface has no laws"):
-        make(laws="laws.h5")
-    with pytest.raises(InputError, match=r"mode = .* must be one of"):
-        make(mode="nodewise")
-    with pytest.raises(InputError, match=r"indenter = .* must be a RigidPlane or a Control"):
-        make(indenter=6e-3)
-    with pytest.raises(InputError, match="a table of several regions"):
-        make(laws=Table(SimpleNamespace(names=("a", "b")), (LAW, LAW)))
-    assert make(laws=Table(SimpleNamespace(names=("a",)), (LAW,))).mode == "pointwise"
+def test_a_table_of_one_region_is_a_law_at_points(body):
+    table = Table(SimpleNamespace(names=("a",)), (LAW,))
+    rough = Interface(body.space, body.tags, TOP, laws=table, indenter=PLANE)
+    assert rough.mode == "pointwise"
     with pytest.raises(InputError, match="nothing is solved or evaluated"):
-        _ = make().force
+        _ = rough.force
 
 
 def test_a_smaller_table_lies_in_the_middle_of_the_face(body):
