@@ -7,11 +7,15 @@ import pytest
 from helpers.body_meshes import HIGH, LOW, box, hanging, standing
 from helpers.contact_laws import Exponential, PowerLaw
 from helpers.user_problems import clamped, elastic, pressed_face
+from mpi4py import MPI
+from scipy.optimize import brentq
 
 from patchlaw.geometry import Control, Friction, PatchGrid, ShearControl
 from patchlaw.geometry.rigid_plane import plane_failure
 from patchlaw.macro import FacePair, LawContactProblem, Material, compat, displacements_under
 from patchlaw.macro.contact import pressed_plane
+from patchlaw.macro.contact.face_layer import FaceLayer
+from patchlaw.macro.contact.pressed_plane import law_lines
 from patchlaw.macro.linear_solvers.options import has_hypre
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
@@ -21,6 +25,63 @@ SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 def problem(laws):
     face = standing(box((0, 0, -1), (3, 1, 0), (9, 4, 4)), SOFT, HALVES)
     return LawContactProblem(face, laws, "pointwise")
+
+
+class Forces:
+    """What `law_lines` asks of contact forces."""
+
+    comm, wearing = MPI.COMM_SELF, None
+
+    def __init__(self, law):
+        self.pressure, self.stiffness = law.pressure, law.stiffness
+        self.asked = []
+
+    def pressure_of(self, some, closure):
+        self.asked.append(len(some))
+        return self.pressure(closure[some])
+
+
+def test_lines_touch_the_law_where_the_bodys_stiffness_leads():
+    law, stiffness = Exponential(0.4e-3), 37.0
+    rng = np.random.default_rng(8)
+    closure = rng.uniform(-2e-3, 30e-3, 40)  # up to e⁷⁵ of pressure
+    pressure = rng.uniform(-5.0, 20.0, 40)
+    lines = law_lines(Forces(law), closure, pressure, stiffness)
+    for at, c, p in zip(lines.closure, closure, pressure, strict=True):
+        exact = brentq(
+            lambda x, c=c, p=p: float(law.pressure(x)) - p + stiffness * (x - c), -3.0, 40e-3,
+            xtol=1e-15,
+        )  # fmt: skip
+        assert at == pytest.approx(exact, abs=1e-5)
+    np.testing.assert_array_equal(lines.pressure, law.pressure(lines.closure))
+    np.testing.assert_array_equal(lines.stiffness, law.stiffness(lines.closure))
+    np.testing.assert_allclose(
+        lines.at(lines.closure + 1e-4), lines.pressure + 1e-4 * lines.stiffness
+    )
+
+
+def test_open_samples_stay_where_they_are_and_are_asked_for_once():
+    forces = Forces(Exponential(0.4e-3))
+    closure, pressure = np.array([-1e-3, -2e-4, 3e-3, -5e-4]), np.array([0.0, 0.0, 4.1, 2.3])
+    lines = law_lines(forces, closure, pressure, 37.0)
+    np.testing.assert_array_equal(lines.closure[:2], closure[:2])
+    assert (lines.closure[2:] != closure[2:]).all()
+    assert set(forces.asked) == {2}
+
+
+def test_a_layer_that_is_the_whole_body_leads_to_the_solution():
+    laws = [Exponential(6e-3), Exponential(0.4e-3)]
+    small = standing(box((0, 0, -1), (3, 1, 0), (4, 2, 1)), SOFT, HALVES)
+    control = Control(approach=21.3e-3)
+    known = LawContactProblem(small, laws, "pointwise").solve(control)
+    fresh, sampling = LawContactProblem(small, laws, "pointwise"), small.pointwise
+    fresh.forces.prescribe(control, np.zeros(3))
+    layer = FaceLayer(fresh.equilibrium)
+    at_rest = np.zeros(len(sampling.weight))
+    lines = layer.lines(at_rest, fresh.forces.closure_of(at_rest), at_rest, 40.0)
+    # steps on the layer end at changes of 1 % of the pressures, and so do its linear solves
+    largest = known.sample_pressure.max()
+    np.testing.assert_allclose(lines.pressure, known.sample_pressure, atol=0.03 * largest)
 
 
 @pytest.mark.long
