@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ CASES = {  # edges; contact face; volumes; areas
         },
     ),
     "seal_ring": (
-        0.5,
+        0.8,
         "sealing face",
         {"ring": 8.0 * ring(20.0, 26.0, 0.25) + 2.0 * ring(22.0, 24.5, 0.25)},
         {
@@ -64,15 +65,26 @@ WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim
 """Radii of cylindrical faces about z."""
 
 
+@pytest.fixture(scope="module")
+def meshed(tmp_path_factory):
+    """Return a function that gives a body's mesh, made by its script once."""
+
+    @cache
+    def made(body):
+        path = tmp_path_factory.mktemp(body) / "body.msh"
+        words = [sys.executable, BODIES / f"{body}.py", "--size", str(CASES[body][0])]
+        subprocess.run([*words, "--out", path], check=True, capture_output=True)
+        return path
+
+    return made
+
+
 @pytest.mark.parametrize(
     "body", [pytest.param(one, marks=[pytest.mark.long] * (one != "seal_ring")) for one in CASES]
 )
-def test_bodies_have_their_dimensions(body, tmp_path):
-    size, face, volumes, areas = CASES[body]
-    path = tmp_path / "body.msh"
-    words = [sys.executable, BODIES / f"{body}.py", "--size", str(size), "--out", path]
-    subprocess.run(words, check=True, capture_output=True)
-    tagged = read_mesh(path, MPI.COMM_SELF)
+def test_bodies_have_their_dimensions(body, meshed):
+    _, face, volumes, areas = CASES[body]
+    tagged = read_mesh(meshed(body), MPI.COMM_SELF)
     assert set(tagged.cell_names) == set(volumes)
     walls = WALLS.get(body, {})
     assert set(tagged.facet_names) == set(areas) | set(walls)
@@ -103,12 +115,8 @@ FORCES = {"brake_pad": 8e3, "flange": 120e3 - 9.5e3, "seal_ring": 45.0}
 
 @pytest.mark.long
 @pytest.mark.parametrize("body", CASES)
-def test_scenes_of_bodies_run(body, tmp_path):
-    path = tmp_path / "body.msh"
-    size = 0.8 if body == "seal_ring" else CASES[body][0]
-    words = [sys.executable, BODIES / f"{body}.py", "--size", str(size), "--out", path]
-    subprocess.run(words, check=True, capture_output=True)
-    small = [*SMALL, f"body.mesh={path}", "law.seeds=[1]", "load.steps=1"]
+def test_scenes_of_bodies_run(body, meshed):
+    small = [*SMALL, f"body.mesh={meshed(body)}", "law.seeds=[1]", "load.steps=1"]
     history = run(Scene.load(BODIES / f"{body}.toml", small))
     assert history.force_N[-1] == pytest.approx(FORCES[body], rel=1e-6)  # Newton's tolerance
     area = CASES[body][3][CASES[body][1]]

@@ -9,6 +9,7 @@ import sys
 from contextlib import chdir
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from helpers.waiting_ranks import alone
@@ -101,6 +102,10 @@ def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     assert f"{1e-3 * stiffness:.0f} ± {1e-3 * error:.0f} kN/mm" in PAGE
     peak = max(float(row.split(",")[-1]) for row in rows[1:])
     assert peak == pytest.approx(2500.0, rel=1e-12)  # the hardness itself, rounded once
+    with h5py.File(results / "contact.h5") as file:
+        pressure = file[f"step_{last.step}/pressure_MPa"][:]
+    yields = np.isclose(pressure, pressure.max()).sum() / (pressure > 0.0).sum()
+    assert f"on {last.contacts} spots; {100 * yields:.0f} % of the cells in contact" in README
     assert (results / "contact.png").is_file()
 
 

@@ -37,7 +37,7 @@ def test_a_kernel_shows_tables_progress_and_pictures():
     assert shown[-1].data["text/plain"] == "(1, True)"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_kernel_shows_a_picture_of_pyplot_once():
     """Older matplotlib shows the first one only after the magic that chooses where it is drawn."""
     pytest.importorskip("ipykernel")

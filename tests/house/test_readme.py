@@ -3,7 +3,6 @@
 import re
 import runpy
 import subprocess
-import sys
 import tomllib
 from hashlib import sha256
 from pathlib import Path
@@ -69,18 +68,6 @@ def test_picture_shows_the_run_that_the_text_tells():
     approach, spots, yields = about["answer"].split(", ")
     assert f"by {approach}, on {spots}; {yields} of the cells in contact" in TEXT
     assert f"`{approach.removesuffix(' µm')}` µm at 20 N" in TEXT
-
-
-@pytest.mark.long
-def test_the_first_run_gives_what_its_picture_shows(tmp_path):
-    """The numbers are printed to four digits, of which ranks and releases change none."""
-    words = ["demos/report.py", "--out", str(tmp_path)]
-    subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
-    with (
-        Image.open(tmp_path / "report.png") as made,
-        Image.open(DEMOS / "pictures" / "report.png") as shown,
-    ):
-        assert made.text == shown.text
 
 
 def test_readme_is_short():

@@ -229,7 +229,7 @@ steps = 2
 OF_THE_SUITE = (
     "tests/verification/test_releases.py",
     "tests/unit/macro/linear_solvers/test_solver_selection.py",
-    "tests/unit/macro/contact/test_stiff_contact.py",
+    "tests/unit/macro/contact/test_first_steps.py",
 )
 NEWER = ("python3.14", "python3.13", "python3.12")
 NO_REGISTRY = ("No matching distribution found", "Could not find a version", "connection")

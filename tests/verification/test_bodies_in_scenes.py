@@ -118,10 +118,6 @@ def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
     assert approach == pytest.approx([step.approach_mm for step in here.steps], rel=1e-10)
 
 
-def above(folder, **changes):
-    return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
-
-
 ROLLERS = [
     *HELD,
     *({"surface": name, "displacement": [0, "free", "free"]} for name in ("left", "right")),
@@ -286,26 +282,6 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 
 
-@pytest.mark.slow
-def test_few_curved_cells_have_the_crown_of_many_straight_ones(folder, sampled):
-    """The parabola as a key on a flat mesh, and as nodes of cells of second order."""
-    write_box(folder / "curved.msh", TICKS, crown=1e-2, order=2)
-    sections = {"surface": SAMPLE, "output": QUIET, "load": {"approach": "6 um", "steps": 1}}
-    law = {"kind": "representative"}
-    crown = {**law, "crown": ["0.1 m", "inf"]}
-    key = done(**sections, law=crown, body=body(folder), table=sampled)
-    found = done(**sections, law=law, body=body(folder, "curved"), table=sampled)
-    # six cells along the parabola, which its nodes are exactly on; the body is 1e-3 lower at its
-    # sides. Straight cells: 2e-3 with 20 of them
-    assert forces(found) == pytest.approx(forces(key), rel=3e-4)
-    with pytest.raises(InputError, match=r"refinements = 1: a mesh of curved cells is not refined"):
-        Run(Scene.from_dict({**PATCHES, "body": body(folder, "curved", refinements=1)}))
-    flat = {**PATCHES, "coupling": {"kind": "isolated", "table_tolerance": 1e-2}}
-    write_box(folder / "second.msh", TICKS, order=2)
-    expected, same = (done(**flat, body=body(folder, name)) for name in ("cube", "second"))
-    assert forces(same) == pytest.approx(forces(expected), rel=1e-10)
-
-
 REFUSED = {
     "contact": ({"contact": "topp"}, "body.contact = 'topp': the mesh has no surface .*did you me"),
     "supports": ({"supports": [{"surface": "botom"}]}, "body.supports = 'botom': .*mean 'bottom'"),
@@ -337,15 +313,3 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
     upside = body(folder, "above", contact="left", supports=[{"surface": "top"}])
     with pytest.raises(InputError, match=r"counter_body.contact: does not face the body"):
         Run(Scene.from_dict({**PATCHES, "body": body(folder), "counter_body": upside}))
-
-
-SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
-
-
-@pytest.fixture(scope="module")
-def small(folder):
-    """Folder with a cube of few cells, and its mirror image above it."""
-    x, y, z = SMALL.ticks
-    write_box(folder / "small.msh", SMALL.ticks)
-    write_box(folder / "small_above.msh", (x, y, -z[::-1]))
-    return folder

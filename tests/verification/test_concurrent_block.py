@@ -26,14 +26,6 @@ def coupling(block):
     return CellContact(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
-@pytest.mark.parametrize("block", FEW)
-def test_a_prescribed_force_is_the_approach_that_gives_it(block):
-    one = coupling(block).press(Control(approach=8e-3, tilt=(0.002, 0.001)))
-    other = coupling(block).press(Control(force=one.force_N, tilt=(0.002, 0.001)))
-    assert other.force_N == pytest.approx(one.force_N, rel=1e-9)
-    assert other.approach_mm == pytest.approx(one.approach_mm, rel=1e-8)
-
-
 def test_a_small_force_is_balanced_from_nothing():
     """Three summits that do not touch yet are to hold the plane: as on the way down."""
     unloading = coupling("cube")

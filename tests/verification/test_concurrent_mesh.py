@@ -83,14 +83,6 @@ def test_laws_on_a_mesh_find_the_contact_problem_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
-    body, counter = cube(tmp_path, 5), cube(tmp_path, 5, above=True)
-    found = forces(body=body, counter_body=counter, **SMALL)
-    softer = body | {"young_modulus": 0.5 * E}
-    np.testing.assert_allclose(found, forces(body=softer, **SMALL), rtol=1e-6)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("first", ["block", "mesh"])
 def test_a_margin_goes_with_a_meshed_counter_body(tmp_path, first):
     """Two alike bodies, both wider than the surface, are one of half the modulus."""

@@ -182,17 +182,3 @@ def test_what_touches_anew_begins_without_shear():
     assert heavier.force[0] == pytest.approx(sheared.force[0], rel=2e-2)
     new = heavier.closed & ~sheared.closed
     assert np.abs(heavier.traction[:, new]).max() < 0.05 * np.abs(sheared.traction).max()
-
-
-def test_all_of_a_path_scales_with_the_modulus():
-    soft, stiff = Rough("smooth waves", False, 0.2), Rough("smooth waves", False, 0.2)
-    stiff.model = FrictionModel(
-        materials=MaterialPair(first=Material(young_modulus=19000.0, poisson_ratio=0.2)),
-        coefficient=FRICTION,
-        spacing=soft.model.spacing,
-        tolerance=1e-8,
-    )
-    shift, _ = soft.shift_of(0.5)
-    one = soft.at(None, shift, 0.0)
-    ten = stiff.model.advance(None, 10.0 * soft.pressed.pressures, ShearControl(shift=(shift, 0.0)))
-    assert ten.force == pytest.approx([10.0 * force for force in one.force], rel=1e-7, abs=1e-6)

@@ -159,18 +159,6 @@ def test_what_springs_leave_of_a_loop_is_their_number(name, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", SURFACES)
-def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
-    case = both(name, 0.0)
-    cells, springs, _ = case.along(PATHS["loop"])
-    for one in (cells, springs):
-        assert one[-1] == pytest.approx(one[4], abs=1e-6)
-    cells, springs, _ = case.along([(1.0, 0.0, 0.0), (1.0, 1.2, -0.9)])
-    assert springs[-1] == pytest.approx([0.8, -0.6], rel=1e-3)  # of a pressure interpolated
-    assert cells[-1] == pytest.approx([0.8, -0.6], rel=1e-6)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("part", "energy"), [pytest.param(0.3, 0.1, marks=pytest.mark.slow), (0.9, 0.02)]
 )

@@ -88,29 +88,6 @@ def test_patches_with_nothing_in_them(tmp_path):
     assert laws.force_N[-1] == pytest.approx(forces[0], rel=1e-3)
 
 
-@pytest.mark.slow
-def test_four_thousand_patches():
-    # hard: 4096² matrices; only loaded patches enter them
-    coarse = {"surface__grid": [128, 128], "micro__finite_slopes": False}
-    fine = coarse | {"patches__grid": [64, 64]}
-    laws, whole = (history(coupling__kind=kind, **fine) for kind in ("consistent", "concurrent"))
-    largest = whole.patch_pressure_MPa[-1].max()
-    assert np.count_nonzero(whole.patch_pressure_MPa[-1]) > 50
-    # tables are made to 1e-3; so many patches add nothing to that
-    assert laws.force_N[-1] == pytest.approx(whole.force_N[-1], rel=1e-3)
-    limit = 0.02 * largest  # their pressures to ten times as much
-    np.testing.assert_allclose(laws.patch_pressure_MPa, whole.patch_pressure_MPa, atol=limit)
-    few = history(coupling__kind="concurrent", **coarse)
-    gathered = whole.patch_pressure_MPa[-1].reshape(4, 16, 4, 16).mean(axis=(1, 3)).ravel()
-    np.testing.assert_allclose(gathered, few.patch_pressure_MPa[-1], atol=1e-10 * largest)
-
-
-@pytest.mark.parametrize("shape", [(1, 32), (32, 1), (3, 3)])
-def test_too_few_heights_are_refused(shape, tmp_path):
-    with pytest.raises(InputError, match="at least 4 × 4 heights"):
-        history(**from_file(tmp_path, np.zeros(shape)))
-
-
 def test_noise_between_the_heights_is_told(tmp_path):
     # hard: a spline through white noise rises far above all heights, and approach counts from it
     noise = 3e-3 * np.random.default_rng(0).standard_normal((32, 32))

@@ -65,23 +65,6 @@ def test_full_plastic_limit_of_a_sphere(cells):
     assert area == pytest.approx(expected, rel=4.0 / (radius * cells) ** 1.5)
 
 
-@pytest.mark.parametrize("tolerance", [1e-10, 1e-8, 1e-5])
-def test_no_pressure_exceeds_the_hardness(tolerance):
-    states = loaded([4e-3, 1e-2, 5e-3, 1e-2], model(tolerance=tolerance, periodic=True))
-    assert max(state.peak_pressure for state in states) <= 400.0 * (1 + 1e-10)
-    assert [bool(state.yielding.any()) for state in states] == [True, True, False, True]
-    # loaded again as far they bear it again, to the residual, from below or from above
-    np.testing.assert_array_equal(states[3].yielding, states[1].yielding)
-
-
-def test_an_endless_hardness_is_the_elastic_solution():
-    elastic = model(hardness=None).press(Control(approach=6e-3))
-    hard = model(hardness=1e6).press(Control(approach=6e-3))
-    np.testing.assert_array_equal(hard.pressure, elastic.pressure)
-    assert elastic.plastic_depth is None
-    assert not hard.plastic_depth.any()
-
-
 def test_unloading_is_elastic_on_the_changed_heights():
     """By hand: lower the heights by the overlap under the hardness, then solve elastically."""
     surface = rough()
@@ -183,7 +166,7 @@ def test_unloading_where_rounding_hid_the_hardness():
 @pytest.mark.parametrize("periodic", [False, True])
 def test_area_bears_the_force_and_holds_what_yields(seed, periodic):
     dice = np.random.default_rng(seed)
-    for _ in range(10):
+    for _ in range(5):
         cells = int(dice.integers(16, 40)), int(dice.integers(16, 40))
         heights = (
             0.01 * dice.standard_normal(cells) if seed < 2 else rough(seed, 64).heights[::2, ::2]
@@ -270,7 +253,7 @@ def slopes_of_parabolas(made, state, displaced=None):
 def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, hardness):
     """It is the slope of the first loading, whether the last step was long or short."""
     made, found = model(rough(seed, 32), hardness), []
-    for count in (1, 4, 20, 100, 400):
+    for count in (1, 4, 20, 100):
         state = loaded(np.linspace(0.0, 8e-3, count + 1)[1:], made)[-1]
         found.append(made.stiffness(state, turns=False))
     values = np.array([one.approach for one in found])
@@ -335,7 +318,7 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
 @pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 100.0, 400.0])
 def test_work_of_a_first_step_is_that_of_many(hardness):
-    surface, ends = rough(5, 48), []
+    surface, ends = rough(5, 32), []
     for count in (1, 64):
         coupling = CellContact(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
         history, before = LoadHistory(approach=(8e-3,), steps=count), None

@@ -260,7 +260,7 @@ def share_at_closing(surface, axis):
     [
         (128, (4, 21), 4, 0.04),
         # mean of ten surfaces 0.418 with a scatter of 0.025 between flows
-        pytest.param(256, (4, 42), 10, 0.015, marks=pytest.mark.long),
+        pytest.param(256, (4, 42), 10, 0.015, marks=pytest.mark.slow),
     ],
 )
 def test_surfaces_close_at_42_per_cent_contact(cells, waves, seeds, apart):

@@ -1,10 +1,13 @@
+"""The interpolant of heights: what it reproduces, its maxima, splines of many knots."""
+
 import pickle
 
 import numpy as np
 import pytest
+from scipy.interpolate import RectBivariateSpline
 
 from patchlaw.geometry import Surface
-from patchlaw.geometry.interpolant import Interpolant
+from patchlaw.geometry.interpolant import Interpolant, at_points
 
 
 def cap(x, y):
@@ -57,24 +60,6 @@ def test_periodic_interpolant_is_the_periodic_spline():
     ]
     h = Interpolant(heights, (1.0, 1.0), periodic=True)
     np.testing.assert_allclose(h(px, py), exact, atol=1e-12)  # padding error 1e-16, rounding
-
-
-@pytest.mark.parametrize("sign, corner", [(1.0, (1.0, 2.0)), (-1.0, (0.0, 0.0))])
-def test_maximum_of_a_plane_is_its_corner(sign, corner):
-    blank = Surface(heights=np.zeros((6, 5)), lengths=(1.0, 2.0))
-    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
-    surface = Surface(heights=sign * (x + y), lengths=blank.lengths)
-    assert surface.highest_point == pytest.approx(corner, abs=1e-12)  # rounding
-    assert surface.highest == pytest.approx(sign * sum(corner), abs=1e-12)
-
-
-def test_maximum_on_one_side_of_the_border():
-    blank = Surface(heights=np.zeros((10, 10)), lengths=(1.0, 1.0))
-    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
-    surface = Surface(heights=x - (y - 0.43) ** 2, lengths=(1.0, 1.0))
-    # the height is exact to rounding, the place to its square root
-    assert surface.highest == pytest.approx(1.0, abs=1e-13)
-    assert surface.highest_point == pytest.approx((1.0, 0.43), abs=1e-7)
 
 
 @pytest.mark.parametrize("periodic", [False, True])
@@ -139,3 +124,38 @@ def test_derivatives_are_not_pickled():
     for (dx, dy), value in zip(orders, values, strict=True):
         np.testing.assert_array_equal(again(*place, dx=dx, dy=dy), value)
     np.testing.assert_array_equal(h(*place, dx=1), values[1])  # what was pickled still has them
+
+
+@pytest.fixture(scope="module", params=[(5, 3000), (3000, 6), (2100, 2100)])
+def whole(request):
+    shape = request.param
+    samples = np.random.default_rng(0).normal(size=shape)
+    return RectBivariateSpline(*(np.arange(count) + 0.5 for count in shape), samples, s=0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("order", [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2)])
+def test_values_are_those_of_the_whole(whole, order):
+    spline = whole.partial_derivative(*order) if any(order) else whole
+    x, y = (
+        np.concatenate([[0.5, knots[-1]], knots[::7], np.linspace(0.5, knots[-1], 401)])
+        for knots in whole.get_knots()
+    )
+    dice = np.random.default_rng(1)
+    px, py = (dice.choice(part, (40, 50)) for part in (x, y))
+    # the same sums of 16 terms of up to ten, in another order
+    np.testing.assert_allclose(at_points(spline, px, py), spline(px, py, grid=False), atol=1e-13)
+    np.testing.assert_allclose(
+        at_points(spline, px[0], 0.7), spline(px[0], 0.7, grid=False), atol=1e-13
+    )
+
+
+def test_points_are_not_looked_for_from_the_first_knot(monkeypatch):
+    """A long flat surface took minutes: FITPACK looks for each of its points from there."""
+    spline = RectBivariateSpline(np.arange(4), np.arange(10_000), np.zeros((4, 10_000)))
+    monkeypatch.setattr(type(spline), "__call__", None)
+    assert not at_points(spline, 1.0, np.linspace(0.0, 9999.0, 50)).any()
+
+
+def test_no_points_at_all(whole):
+    assert at_points(whole, np.zeros(0), np.zeros(0)).shape == (0,)

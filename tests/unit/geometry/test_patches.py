@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from helpers.uneven_grid import uneven_grid
 
 from patchlaw import InputError
 from patchlaw.geometry import PatchGrid, Surface, patch_means
@@ -46,14 +45,6 @@ def test_every_point_is_in_exactly_one_patch(patches):
     np.testing.assert_array_equal(index, np.argmax(holders, axis=1))
 
 
-@pytest.mark.parametrize("patches", GRIDS)
-def test_centres_lie_in_their_own_patch(patches):
-    np.testing.assert_array_equal(patches.index_of(*patches.centres.T), np.arange(patches.count))
-    np.testing.assert_array_equal(
-        [patches.single(i).centres[0] for i in range(patches.count)], patches.centres
-    )
-
-
 def test_a_single_patch_keeps_its_place():
     single = GRIDS[1].single(8)
     assert single.grid == (1, 1) and single.count == 1
@@ -73,21 +64,6 @@ def test_patches_that_do_not_exist_are_refused(i):
     for question in (GRIDS[0].bounds, GRIDS[0].unravel, GRIDS[0].single):
         with pytest.raises(InputError, match=rf"{i}: there is no such patch.*0 … 15"):
             question(i)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"grid": (0, 4)}, r"grid = \(0, 4\): must be 2 .*; 0 must be .* equal to 1"),
-        ({"grid": (2.5, 4)}, r"grid = \(2.5, 4\): must be 2 whole numbers"),
-        ({"lengths": (1.0, -1.0)}, "lengths = .*; -1.0 must be greater"),
-        ({"origin": (np.inf, 0.0)}, "origin .* must be 2 numbers; inf must be a finite"),
-        ({"origin": (0.0,)}, "origin .* must be 2 numbers"),
-    ],
-)
-def test_grids_that_make_no_sense_are_refused(change, message):
-    with pytest.raises(InputError, match=message):
-        PatchGrid(**{"grid": (4, 4), "lengths": (1.0, 1.0), **change})
 
 
 @pytest.mark.parametrize("grid", [(1, 1), (2, 5), (3, 4), (7, 11), (30, 1)])
@@ -110,10 +86,3 @@ def test_patch_means_of_a_part():
     assert patch_means(surface, part) == pytest.approx([(0.5 * 9 + 13) / 1.5], rel=1e-14)
     with pytest.raises(InputError, match="patches reach beyond the surface along y"):
         patch_means(surface, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0), origin=(0.0, 3.5)))
-
-
-def test_means_weighted_by_area_are_the_mean():
-    surface = Surface(heights=np.random.default_rng(4).random((12, 9)), lengths=(1.0, 1.0))
-    uneven = uneven_grid(ticks_x=(0.0, 0.03, 0.4, 1.0), ticks_y=(0.0, 0.71, 1.0))
-    means = patch_means(surface, uneven)
-    assert means @ uneven.areas == pytest.approx(surface.heights.mean(), rel=1e-14)

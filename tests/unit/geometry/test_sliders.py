@@ -247,17 +247,6 @@ def test_a_loop_closes_and_loses_its_area(sliders):
     assert sum(float(each.lost[0]) for each in found[1:]) == pytest.approx(area, rel=3e-3)
 
 
-def test_the_way_along_a_line_does_not_count(sliders):
-    slip = 0.6 * MU * RATIO * END
-    pressed = (0.8 * END, 0, 0)
-    *_, once = walk(sliders, [pressed, (0.8 * END, slip, 0)])
-    *_, often = walk(sliders, [pressed, *((0.8 * END, slip * s, 0) for s in (0.1, 0.45, 0.7, 1))])
-    assert often.stress == pytest.approx(once.stress, rel=1e-13)
-    # sticking under a rising load, the path does not count: springs that touch anew are unsheared
-    *_, back = walk(sliders, [pressed, (0.8 * END, 1e-3 * slip, 0), pressed])
-    assert np.abs(back.stress).max() <= 1e-2 * MU * float(pressure(0.8 * END))
-
-
 def test_springs_that_part_lose_their_energy(sliders):
     held = (0.8 * END, 0.2 * MU * RATIO * END, 0)
     pressed, sheared, parted = walk(sliders, [(0.8 * END, 0, 0), held, (0.0, *held[1:])])

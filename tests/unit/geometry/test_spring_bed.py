@@ -156,10 +156,3 @@ def test_mindlins_ratio_is_that_of_the_pair(poisson_ratio):
     pair = MaterialPair(first=soft, second=soft)
     assert pair.stiffness_ratio == pytest.approx(mindlin_ratio(poisson_ratio), rel=1e-15)
     assert mindlin_ratio(0.0) == 1.0
-
-
-@pytest.mark.parametrize("coefficient", [0.0, -0.1, 10.5, np.nan])
-def test_coefficients_out_of_range_are_refused(coefficient):
-    with pytest.raises(InputError) as error:
-        Friction(coefficient=coefficient)
-    assert error.value.key == "coefficient"

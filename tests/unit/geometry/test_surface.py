@@ -63,12 +63,6 @@ def test_heights_that_are_not_finite_are_counted_and_located():
         Surface(heights=heights, lengths=(1.0, 1.0))
 
 
-@pytest.mark.parametrize("lengths", [(1.0,), (1.0, 0.0), (-1.0, 1.0), (np.inf, 1.0), "mm", 1.0])
-def test_lengths_must_be_two_positive_numbers(lengths):
-    with pytest.raises(InputError, match=r"lengths.*(two positive|2) numbers"):
-        Surface(heights=np.zeros((4, 4)), lengths=lengths)
-
-
 def test_points_outside_are_refused_with_their_number():
     with pytest.raises(InputError, match=r"2\.5: 1 points lie outside the surface.*≤ x ≤ 2\.0"):
         plane().height_at([0.0, 2.5], 1.0)

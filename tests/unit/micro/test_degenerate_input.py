@@ -70,10 +70,6 @@ def test_tiny_approach(surface):
 
 
 def test_nan_is_refused_where_it_enters(surface):
-    heights = surface.heights.copy()
-    heights[3, 5] = np.nan
-    with pytest.raises(InputError, match=r"1 of 1600 heights are masked.*index \(3, 5\)"):
-        Surface(heights=heights, lengths=(1.0, 1.0))
     asperities = find_asperities(surface)
     for name in ("x", "z", "angle", "border_z"):
         values = getattr(asperities, name).copy()
@@ -81,11 +77,6 @@ def test_nan_is_refused_where_it_enters(surface):
         message = rf"nan: {name} of 1 asperities is not finite, the first at index 1"
         with pytest.raises(InputError, match=message):
             replace(asperities, **{name: values})
-    for model in models(surface):
-        with pytest.raises(InputError, match="approach = nan: must be a finite number"):
-            curve(model, surface, [1e-3, np.nan])
-        with pytest.raises(InputError, match=r"tilt .* must be 2 numbers"):
-            model.press(Control(approach=1e-3, tilt=(0.0, np.nan)))
 
 
 def test_one_summit_outside_the_patches():
@@ -126,9 +117,6 @@ def test_half_space_has_an_answer_to_each(surface):
     assert not curve(model, surface, [0.0, -1.0]).force.any()
     beyond = curve(model, surface, np.ptp(surface.heights) * np.array([1.0, 3.0, 30.0]))
     assert np.all(np.isfinite(beyond.force)) and np.all(np.diff(beyond.force) > 0.0)
-    for approaches in ([1e-3, np.nan], [np.inf]):
-        with pytest.raises(InputError, match="finite"):
-            curve(model, surface, approaches)
 
 
 def test_one_contact_alone_stands_for_itself():

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from patchlaw.support import InputError, NotBalanced, NotConverged
+from patchlaw.support import InputError, NotBalanced, NotConverged, check_scale, frozen_array
 
 
 @pytest.mark.parametrize(
@@ -96,3 +96,24 @@ def test_values_within_themselves_are_shown():
     value = []
     value.append(value)
     assert str(InputError("is wrong", value=value)).startswith("[[[[")
+
+
+def test_frozen_arrays_are_copies():
+    original = np.arange(4)
+    copy = frozen_array(original)
+    original[0] = 7
+    assert copy[0] == 0.0 and not copy.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        np.zeros((4, 4)),
+        np.full((4, 4), 1e-200),
+        1.0 + 1e-16 * np.arange(16.0).reshape(4, 4),  # but for rounding
+        1e-14 * np.arange(16.0).reshape(4, 4),
+        np.full((4, 4), np.nan),
+    ],
+)
+def test_level_planes_and_fine_roughness_pass(heights):
+    check_scale(heights)

@@ -1,19 +1,9 @@
 """Refinement by bisection: conforming, within bounds of size and shape, with tags inherited."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
 
-from patchlaw.geometry.meshes import bisection
-from patchlaw.geometry.meshes.bisection import (
-    Tetrahedra,
-    from_hexahedra,
-    reentrant_edges,
-    refined,
-    with_middles,
-)
+from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, reentrant_edges, refined
 from patchlaw.geometry.meshes.block import lattice_cells
 
 SIDES = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
@@ -99,27 +89,6 @@ def test_tags_are_inherited(small):
     assert areas(mesh, -1).sum() == pytest.approx(5.0, rel=1e-12)
 
 
-def test_mesh_does_not_depend_on_the_unit(small):
-    begin, mesh, size = small
-    in_metres = Tetrahedra(
-        points=1e-3 * begin.points,
-        cells=begin.cells,
-        cell_tags=begin.cell_tags,
-        facets=begin.facets,
-        facet_tags=begin.facet_tags,
-    )
-    other = refined(in_metres, lambda middles: 1e-3 * size(1e3 * middles))
-    np.testing.assert_array_equal(other.cells, mesh.cells)
-
-
-def test_middles_lie_between_the_corners_that_dolfinx_expects(small):
-    _, mesh, _ = small
-    points, cells = with_middles(mesh)
-    ends = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
-    np.testing.assert_array_equal(points[cells[:, 4:]], points[cells[:, ends]].mean(axis=2))
-    assert len(np.unique(cells)) == len(points)
-
-
 def test_hexahedra_of_any_form_are_divided_without_gaps():
     bits = (np.arange(8)[:, None] >> np.arange(3)) & 1
     points = bits + np.random.default_rng(3).uniform(-0.15, 0.15, (8, 3))
@@ -142,21 +111,3 @@ def test_hollow_edges_are_where_stresses_are_singular():
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     np.testing.assert_allclose(ends[..., [0, 2]], 0.5)
     assert not len(reentrant_edges(box()))
-
-
-def test_with_an_edge_the_longest_of_every_facet_and_cell_with_it_is_divided():
-    """Looked up one by one, on cells of every shape."""
-    random = np.random.default_rng(8)
-    points = random.random((60, 3))
-    cells = np.asarray(Delaunay(points).simplices, dtype=np.int64)
-    edges, of_cell = bisection._edges(cells)
-    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-    number = {tuple(edge): k for k, edge in enumerate(edges.tolist())}
-    asked = random.random(len(edges)) < 0.03
-    found = bisection._closed(asked, of_cell, bisection._order(lengths))
-    assert found[asked].all() and not found.all()
-    for cell in np.sort(cells).tolist():
-        for size in (3, 4):
-            for corners in combinations(cell, size):
-                these = [number[pair] for pair in combinations(corners, 2)]
-                assert found[max(these, key=lengths.__getitem__)] or not found[these].any()

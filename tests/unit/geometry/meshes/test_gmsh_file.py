@@ -19,44 +19,6 @@ def write(path, elements, points=CUBE, names=NAMES, **options):
     return write_msh2(path / "part.msh", points, elements, names, **options)
 
 
-@pytest.fixture(scope="module")
-def boxes(tmp_path_factory):
-    """Return the same mesh in all forms of gmsh's files."""
-    folder = tmp_path_factory.mktemp("boxes")
-    forms = [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)]
-    return [
-        read_gmsh_file(write_boxes(folder / f"{version}_{binary}.msh", version, binary))
-        for version, binary in forms
-    ]
-
-
-def test_formats_hold_the_same_mesh(boxes):
-    for other in boxes[1:]:
-        for name in ("points", "cells", "cell_tags", "facets", "facet_tags"):
-            one, two = getattr(boxes[0], name), getattr(other, name)
-            # text has 16 digits
-            np.testing.assert_allclose(np.sort(one, axis=0), np.sort(two, axis=0), rtol=1e-15)
-    for mesh in boxes:
-        assert mesh.cell_names == {"plate": 10, "lining": 11}
-        assert mesh.facet_names == {"pad face": 5, "back": 6}
-
-
-def test_groups_are_those_of_the_model(boxes):
-    mesh = boxes[-1]
-    corners = mesh.points[mesh.cells]
-    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
-    for tag, size, lower, upper in ((10, 1.0, 0.0, 1.0), (11, 0.5, 1.0, 1.5)):
-        of_tag = mesh.cell_tags == tag
-        assert volume[of_tag].sum() == pytest.approx(size, rel=1e-13)  # sums of products
-        height = corners[of_tag][:, :, 2]
-        assert (height.min(), height.max()) == (lower, upper)
-    for tag, height in ((5, 1.5), (6, 0.0)):
-        x = mesh.points[mesh.facets[mesh.facet_tags == tag]]
-        assert (x[:, :, 2] == height).all()
-        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-        assert 0.5 * np.linalg.norm(normal, axis=1).sum() == pytest.approx(1.0, rel=1e-13)
-
-
 def test_nodes_may_have_gaps_and_no_cells(tmp_path):
     points = np.vstack([[[9.0, 9.0, 9.0]], CUBE])
     elements = [(4, 4, 1, np.add(cell, 1)) for cell in TWO] + [(2, 9, 1, [1, 2, 3])]
@@ -233,13 +195,6 @@ def test_versions_are_numbers(tmp_path, version):
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("2.2 0 8", f"{version} 0 8"), encoding="utf-8")
     assert read_gmsh_file(path).cell_names == {"body": 4}
-
-
-def test_missing_files_and_folders_are_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        read_gmsh_file(tmp_path / "none.msh")
-    with pytest.raises(InputError, match="cannot be read: Is a directory"):
-        read_gmsh_file(tmp_path)
 
 
 FORMS = [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)]

@@ -5,14 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from patchlaw.geometry.meshes.block import (
-    Segment,
-    cells_beyond,
-    lattice_cells,
-    lattice_part,
-    node_planes,
-    node_share,
-)
+from patchlaw.geometry.meshes.block import cells_beyond, lattice_part
 
 LATTICES = [(7, 5, 3), (1, 1, 1), (1, 2, 9), (40, 3, 2)]
 CASES = list(itertools.product(LATTICES, (1, 2, 3, 4, 7, 12)))
@@ -26,12 +19,6 @@ def owners_of(cells, ranks):
         assert (owners[box] == -1).all()
         owners[box] = rank
     return owners
-
-
-@pytest.mark.parametrize(("cells", "ranks"), CASES)
-def test_every_cell_belongs_to_one_rank(cells, ranks):
-    owners = owners_of(cells, ranks)
-    assert (owners >= 0).all()
 
 
 @pytest.mark.parametrize("ranks", [2, 3, 5, 8, 16, 37])
@@ -62,47 +49,3 @@ def test_ranks_beyond_faces(cells, ranks):
                     expected.add((number, owners[tuple(beside)]))
         pairs = list(zip(*cells_beyond(cells, ranks, part), strict=True))
         assert set(pairs) == expected and len(pairs) == len(expected)
-
-
-def test_hexahedra_have_the_vertices_of_their_box():
-    cells = (3, 4, 5)
-    part = lattice_part(cells, 3, 1)
-    corners = node_planes(cells, lattice_cells(cells, part, hexahedra=True).ravel())
-    corners = corners.reshape(-1, 8, 3)
-    np.testing.assert_array_equal(corners[:, 0], list(itertools.product(*part)))
-    # x runs first, then y, then z
-    steps = [(v % 2, v // 2 % 2, v // 4) for v in range(8)]
-    np.testing.assert_array_equal(corners - corners[:, :1], np.broadcast_to(steps, corners.shape))
-
-
-def test_tetrahedra_fill_their_boxes_and_meet_face_to_face():
-    cells = (2, 3, 2)
-    table = lattice_cells(cells, lattice_part(cells, 1, 0), hexahedra=False)
-    corners = node_planes(cells, table.ravel()).reshape(-1, 4, 3)
-    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
-    np.testing.assert_allclose(volumes, 1.0 / 6.0, rtol=1e-12)  # round-off of a determinant
-    boxes = corners.min(axis=1)
-    assert (np.unique(boxes, axis=0, return_counts=True)[1] == 6).all()
-    faces = np.concatenate([np.delete(np.sort(table, axis=1), k, axis=1) for k in range(4)])
-    counts = np.unique(faces, axis=0, return_counts=True)[1]
-    outer = 2 * 2 * (2 * 3 + 3 * 2 + 2 * 2)
-    assert set(counts) == {1, 2} and (counts == 1).sum() == outer
-
-
-@pytest.mark.parametrize("ranks", [1, 3, 100])
-def test_shares_of_the_nodes_are_all_nodes_in_order(ranks):
-    ticks = np.array([0.0, 0.1, 0.7]), np.array([-1.0, 2.0]), np.array([-3.0, -1.0, 0.0])
-    shares = [node_share(ticks, ranks, rank) for rank in range(ranks)]
-    assert max(map(len, shares)) - min(map(len, shares)) <= 1
-    np.testing.assert_array_equal(np.concatenate(shares), list(itertools.product(*ticks)))
-
-
-@pytest.mark.parametrize("cells, growth", [(1, 5.0), (4, 1.0), (4, 8.0), (3, 0.1)])
-def test_segments_grow_geometrically(cells, growth):
-    segment = Segment(start=-1.0, end=3.0, cells=cells, growth=growth)
-    sizes = np.diff(segment.ticks)
-    assert segment.ticks[0] == -1.0 and segment.ticks[-1] == 3.0 and len(sizes) == cells
-    assert sizes[-1] / sizes[0] == pytest.approx(growth if cells > 1 else 1.0, rel=1e-12)
-    ratio = growth ** (1.0 / max(cells - 1, 1))
-    np.testing.assert_allclose(sizes[1:] / sizes[:-1], ratio, rtol=1e-12)
-    assert segment.narrowest == pytest.approx(sizes.min(), rel=1e-12)

@@ -1,14 +1,12 @@
-"""Samples, loads and means of the interface."""
-
-from functools import partial
+"""Samples, loads, means and regions of the interface."""
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
-from patchlaw.macro.contact.face_laws import by_patch
+from patchlaw.macro import Block, LoadedFace, Material, RoughFace, block_mesh, displacements_under
+from patchlaw.macro.contact.face_nodes import TopNodes
 from patchlaw.support import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
@@ -56,17 +54,6 @@ def test_margin_is_free_of_traction():
     assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((0, 2, 0, 1), abs=1e-12)
 
 
-def test_laws_see_the_samples_of_their_own_patch():
-    interface = make((3, 2))
-    laws = [partial(np.full_like, fill_value=float(i)) for i in range(6)]
-    for mode in ("patchwise", "pointwise"):
-        sampling = interface.sampling(mode)
-        closure = np.zeros(len(sampling.weight))
-        np.testing.assert_array_equal(by_patch(laws, sampling.patch, closure), sampling.patch)
-        expected = np.arange(6) * interface.patches.area
-        np.testing.assert_allclose(sampling.patch_sums(sampling.patch * 1.0), expected, rtol=NODES)
-
-
 @pytest.mark.parametrize("grid", [(2, 1), (3, 2)])
 def test_compliance_of_unequal_patches_is_that_of_direct_solutions(grid):
     """Patches that reach beyond the top are cut; A_i C_ij is symmetric, C_ij is not."""
@@ -101,8 +88,24 @@ def test_patches_beyond_a_small_top_are_refused():
         make((10, 10), (1.2e-3, 1e-3), **small)
 
 
-def test_unknown_mode_is_refused():
-    with pytest.raises(
-        InputError, match=r"'cellwise': unknown interface \(allowed: patchwise, pointwise\)"
-    ):
-        make().sampling("cellwise")
+MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
+
+
+def top_of(element="Q1", cells=(6, 4, 1), grid=(2, 2)):
+    shape = BlockShape(interface=(3.0, 2.0), height=1.0, cells=cells, element=element)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), MATERIAL)
+    return TopNodes(RoughFace.of_block(block), PatchGrid(grid=grid, lengths=(3.0, 2.0)))
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_regions_are_joined_by_facets(element):
+    top = top_of(element)
+    near = np.hypot(top.x - 0.5, top.y - 0.5) < 0.6
+    far = np.hypot(top.x - 2.5, top.y - 1.5) < 0.3
+    assert top.regions(near & far)[1] == 0
+    assert top.regions(near)[1] == 1
+    assert top.regions(near | far)[1] == 2
+    assert top.regions(np.ones_like(near))[1] == 1
+    # two nodes with one between them do not touch each other
+    apart = np.isclose(top.y, 1.0) & (np.isclose(top.x, 0.5) | np.isclose(top.x, 1.5))
+    assert top.regions(apart)[1] == 2

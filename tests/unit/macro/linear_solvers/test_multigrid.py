@@ -37,30 +37,6 @@ def free_of(block):
     return free
 
 
-def test_pairs_merge_from_the_last_down_where_they_are_short():
-    assert lines(4.0, 3.0, 1.0, 1.0, 1.0).merged(2.0).tolist() == [0, 1, 2, 3, 5]
-    assert lines(1.0, 1.0, 1.0).merged(2.0).tolist() == [0, 1, 3]
-    assert lines(1.0, 1.0).merged(1.9).tolist() == [0, 1, 2]
-
-
-def test_planes_amid_elements_go_first():
-    quadratic = lines(2.0, 1.0, 1.0, degree=2)
-    assert quadratic.middle.tolist() == [False, True] * 3 + [False]
-    assert quadratic.merged(1.0).tolist() == [0, 1, 2, 4, 6]
-    # 1.5 would reach from the middle of the first element to that of the second
-    assert lines(2.0, 1.0, 2.0, degree=2).merged(1.5).tolist() == [0, 1, 2, 4, 5, 6]
-
-
-def test_shares_interpolate_linear_functions():
-    graded = lines(1.0, 2.0, 4.0, 8.0)
-    kept = np.array([0, 2, 4])
-    before, ahead = graded.shares(kept)
-    after = np.minimum(before + 1, 2)
-    ticks = graded.ticks[kept]
-    np.testing.assert_allclose((1 - ahead) * ticks[before] + ahead * ticks[after], graded.ticks)
-    assert np.array_equal(ahead[kept], np.zeros(3))
-
-
 def test_flat_cells_become_thick_first_and_layers_even():
     flat = [lines(*np.full(16, 8.0)), lines(*np.full(16, 8.0)), lines(*np.ones(16))]
     sizes = [tuple(len(of) for of in kept) for kept in coarsenings(flat, coarsest=300)]
@@ -71,14 +47,6 @@ def test_flat_cells_become_thick_first_and_layers_even():
         thin = thin.only(kept[0])
     lengths = np.diff(thin.ticks)
     assert lengths.max() / lengths.min() < 0.2 * 1.5**11  # what it was between the first and last
-
-
-def test_coarsening_ends():
-    assert coarsenings([lines(1.0)] * 3) == []
-    assert len(coarsenings([lines(1.0, 1.0)] * 3)) == 1
-    for kept in coarsenings([lines(*np.ones(40)), lines(1.0), lines(1.0)], coarsest=1):
-        last = kept
-    assert [len(of) for of in last] == [2, 2, 2]
 
 
 @pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
@@ -173,24 +141,6 @@ def test_nearly_incompressible_blocks_take_more_smoothing(iterations, element, r
     block = make(poisson_ratio=ratio, cells=cells, element=element, grading=4.0)
     assert block.solver.pc.getType() == "mg"
     assert iterations(block) <= bound
-
-
-def test_same_displacement_as_by_algebraic_multigrid():
-    geometric, database = make(grading=4.0), PETSc.Options("patchlaw_")
-    database["pc_type"] = "gamg"
-    try:
-        algebraic = make(grading=4.0)
-        assert algebraic.solver.pc.getType() == "gamg"
-    finally:
-        database.delValue("pc_type")
-    fields = []
-    for block in (geometric, algebraic):
-        load = block.stiffness.createVecRight()
-        load.set(1.0)
-        load.pointwiseMult(load, block.free)
-        fields.append(block.solve(load).x.array)
-    # residuals of 1e-10 through a condition number of about 1e3
-    np.testing.assert_allclose(*fields, atol=1e-7 * np.abs(fields[0]).max())
 
 
 def test_meshes_without_planes_have_no_lattice():

@@ -1,7 +1,5 @@
 """Matrices of coarser grids against dense Galerkin products, and the blocks they are made from."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -10,14 +8,7 @@ from petsc4py import PETSc
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import multigrid
-from patchlaw.macro.linear_solvers.multigrid import (
-    block_rows,
-    coarser_grids,
-    galerkin,
-    lattice_of,
-    transfers,
-)
-from patchlaw.macro.linear_solvers.node_matrices import dofs_of, node_submatrix
+from patchlaw.macro.linear_solvers.multigrid import coarser_grids, galerkin, lattice_of, transfers
 
 
 def make(sides="free", **changes):
@@ -74,30 +65,3 @@ def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
     monkeypatch.setattr(multigrid, "_NODES_AT_ONCE", 7)
     pieces = dense(galerkin(*products))
     np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
-
-
-def test_blocks_are_those_of_the_matrix():
-    matrix = make("roller").stiffness
-    with block_rows(matrix) as rows:
-        blocks = rows.own.data.reshape(-1, 3, 3).transpose(0, 2, 1).copy()
-        starts, columns = rows.own.indptr.copy(), rows.own.indices.copy()
-        assert rows.ghost.nnz == len(rows.ghosts) == 0
-    expected = dense(matrix)
-    found = np.zeros_like(expected)
-    for node, (first, last) in enumerate(pairwise(starts)):
-        for block, column in zip(blocks[first:last], columns[first:last], strict=True):
-            found[3 * node : 3 * node + 3, 3 * column : 3 * column + 3] = block
-    np.testing.assert_array_equal(found, expected)
-
-
-def test_other_types_of_matrices_are_refused():
-    with pytest.raises(PETSc.Error):
-        with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
-            pass
-
-
-def test_parts_are_those_of_the_matrix():
-    matrix = make("roller").stiffness
-    rows, columns = np.array([0, 3, 40]), np.array([1, 2, 3, 41])
-    expected = dense(matrix)[np.ix_(dofs_of(rows), dofs_of(columns))]
-    np.testing.assert_array_equal(node_submatrix(matrix, rows, columns).toarray(), expected)

@@ -32,15 +32,6 @@ def stiffened(face):
     return Stiffened(face.body.stiffness, face.body.stiffnesses, springs)
 
 
-def test_products_are_those_of_the_sum(face, stiffened):
-    stiffness = face.body.stiffness
-    x, y = stiffness.createVecs()
-    x.array[:] = np.random.default_rng(3).standard_normal(x.local_size)
-    stiffened.product.mult(x, y)
-    np.testing.assert_allclose(y.array_r, (stiffened.assembled() * x).array_r, rtol=1e-12)
-    assert abs((stiffness * x).array_r - y.array_r).max() > 1e-3 * abs(y.array_r).max()
-
-
 def test_diagonal_blocks_are_those_of_the_sum(stiffened):
     every = np.arange(stiffened.product.size[0], dtype=PETSc.IntType)
     blocks, whole = (

@@ -7,7 +7,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, RefinedShape
-from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from patchlaw.macro import BOTTOM, SIDES, TOP, block_mesh, compat
 from patchlaw.support import InputError
 
 
@@ -57,17 +57,6 @@ def test_planes_say_where_nodes_are(element):
     np.testing.assert_array_equal(block.mesh.geometry.x, np.stack(places, axis=1))
 
 
-def test_compiled_forms_serve_lattices_and_meshes_of_gmsh():
-    square = {"interface": (1.0, 1.0), "height": 1.0, "element": "P1"}
-    shapes = (
-        BlockShape(cells=(1, 1, 1), **square),
-        RefinedShape(places=np.zeros((1, 2)), fine=0.5, coarse=0.5, growth=1.0, **square),
-    )
-    material = Material(young_modulus=1.0, poisson_ratio=0.3)
-    lattice, refined = (Block(block_mesh(shape, MPI.COMM_SELF), material) for shape in shapes)
-    assert lattice.form.signature() == refined.form.signature()
-
-
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_tables_of_a_mesh_fit_its_space(element):
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
@@ -82,14 +71,3 @@ def test_tables_of_a_mesh_fit_its_space(element):
     places = space.tabulate_dof_coordinates()[compat.cell_nodes(space)[:, :corners]]
     np.testing.assert_allclose(places, mesh.geometry.x[table], atol=1e-14)  # round-off
     assert isinstance(fem.Function(space).x.array, np.ndarray)
-
-
-@pytest.mark.parametrize("size", [1.0, 3.0, 3e-9])
-def test_refined_blocks_have_their_own_size(size):
-    refined = RefinedShape(
-        interface=(size, size), height=size, places=np.array([[0.5 * size, 0.5 * size]]),
-        fine=0.3 * size, coarse=0.5 * size, element="P2",
-    )  # fmt: skip
-    points = block_mesh(refined, MPI.COMM_SELF).mesh.geometry.x
-    np.testing.assert_allclose(points.min(axis=0), [0.0, 0.0, -size], atol=1e-12 * size)
-    np.testing.assert_allclose(points.max(axis=0), [size, size, 0.0], atol=1e-12 * size)

@@ -21,14 +21,6 @@ def curve(model, approaches, patches=PATCHES, **options):
 
 
 @every_model
-def test_name_and_kind(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    assert model.name == name
-    assert (not model.pairs.circular) == name.startswith("elliptic")
-    assert model.pairs.half_space == (not name.endswith("independent"))
-
-
-@every_model
 def test_single_asperity_is_hertz(summits, name):
     one = summits(0.3, 0.7, z=-1e-3, major=0.4, minor=0.1, highest=0.0)
     model = AsperityModel(name, one, contact_modulus=E_STAR)
@@ -118,10 +110,6 @@ def test_refuses(cluster):
     with pytest.raises(InputError, match=r"-1\.0: the contact modulus must be positive"):
         AsperityModel("circular", cluster, contact_modulus=-1.0)
     model = AsperityModel("elliptic", cluster, contact_modulus=1.0)
-    with pytest.raises(InputError, match="approach = inf: must be a finite number"):
-        pressed(model, np.inf)
-    with pytest.raises(InputError, match="every patch needs one finite mean height"):
-        respond(model, [1e-3], patches=PATCHES, mean_heights=np.zeros(3))
     corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
     with pytest.raises(InputError, match="points lie outside the patches"):
         respond(model, [1e-3], patches=corner, mean_heights=[0.0])

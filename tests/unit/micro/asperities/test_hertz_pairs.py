@@ -77,19 +77,6 @@ def test_continuation_is_smooth(summits, circular):
     assert value[-1] - value[0] == pytest.approx(area, rel=1e-6)
 
 
-@both_shapes
-def test_coincident_summits(summits, circular):
-    twins = summits([0.5, 0.5], 0.5, major=0.2, minor=0.1)
-    caused = interaction(twins, circular).evaluate(np.array([1e-3, 1e-3]))
-    assert caused.displacement == pytest.approx(MERGING_SLOPE * np.full(2, 1e-3), rel=1e-14)
-    assert caused.overlapping_contacts == 2
-
-
-def test_merging_slope_gives_twins_the_force_of_one():
-    t = 1.0 / (1.0 + MERGING_SLOPE)
-    assert 2 * t**1.5 == pytest.approx(1.0, rel=1e-15)
-
-
 def test_merging_parameter():
     beta = np.array([1.0, 0.5, 1e-2, 1e-6, 1e-12])
     integral = elliprf(0.0, beta, 1.0)

@@ -62,17 +62,6 @@ def test_new_pressures_and_their_combinations_are_exact(slopes):
         assert on_cells == pytest.approx(exact.ravel()[cells], abs=slack)
 
 
-def test_the_mean_changes_along_pressures_as_that_of_slopes_worked_out_anew(slopes):
-    cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
-    pressure, change = np.random.default_rng(7).random((2, len(cells)))
-    remembering, step = RememberedSlopes(slopes, cells), 1e-4
-    remembering.learn(pressure, 1e-6)
-    remembering.learn(change, 1e-6)
-    ends = (slopes.displacement(scattered(cells, pressure + s * change)) for s in (step, -step))
-    exact = (next(ends).mean() - next(ends).mean()) / (2.0 * step)  # to 1e-8 by central differences
-    assert remembering.mean_rate(pressure, change) == pytest.approx(exact, rel=1e-7)
-
-
 def test_the_interface_stiffness_is_that_of_the_slopes_worked_out_anew(slopes):
     quick = model_with(slopes).quick_up_to(LARGEST)
     state = quick.press(LARGEST)
@@ -80,35 +69,6 @@ def test_the_interface_stiffness_is_that_of_the_slopes_worked_out_anew(slopes):
     exact = model_with(slopes).stiffness(state)
     # what rates are remembered to, 2e-4, times the few per cent by slopes
     assert found.interface == pytest.approx(exact.interface, rel=2e-6)
-
-
-def test_a_combination_is_not_worked_out_anew(slopes):
-    cells = np.arange(100, 140)
-    one, other = np.random.default_rng(2).random((2, len(cells)))
-    remembering = RememberedSlopes(slopes, cells)
-    assert remembering.learn(one, 1e-6)
-    assert remembering.learn(other, 1e-6)
-    assert not remembering.learn(2.0 * one + other, 1e-6)
-    assert np.any(remembering.displacement(2.0 * one + other))
-
-
-def test_the_share_of_the_second_order_changes_as_its_rate_says(slopes):
-    cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
-    pressure, change = np.random.default_rng(4).random((2, len(cells)))
-    remembering, step = RememberedSlopes(slopes, cells), 1e-4
-    for few in (pressure, change):
-        remembering.learn(few, 1e-6)
-
-    def moved(few):
-        return slopes.displacement(scattered(cells, few)).ravel()[cells]
-
-    by_share, along = remembering.share_rate(pressure)
-    linear = by_columns(remembering, pressure, change)
-    rate = linear + by_share * (along @ change)
-    expected = (moved(pressure + step * change) - moved(pressure - step * change)) / (2.0 * step)
-    # the square of the step, and rounding over it
-    assert rate == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
-    assert np.abs(rate - linear).max() > 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.long

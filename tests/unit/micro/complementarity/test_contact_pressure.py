@@ -8,7 +8,6 @@ from scipy.optimize import nnls
 from patchlaw import NotConverged
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity.active_set import solve
-from patchlaw.micro.complementarity.cell_problem import coarsened, refined
 from patchlaw.micro.complementarity.solver import nested_start
 
 CASES = {
@@ -108,16 +107,6 @@ def test_coarse_start_saves_products_on_the_fine_grid():
     nested = solve(problem, nested_start(problem))
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
-
-
-def test_coarse_grids():
-    field = np.arange(15.0).reshape(3, 5)
-    coarse = coarsened(field, (2, 2))
-    assert coarse.shape == (2, 3)
-    assert coarse[0, 0] == field[:2, :2].mean()
-    assert coarse[1, 2] == field[2, 4]  # an incomplete block repeats its last cell
-    assert refined(coarse, (2, 2))[:3, :5].shape == field.shape
-    assert refined(coarse, (2, 1))[:, 0].tolist() == [coarse[0, 0]] * 2 + [coarse[1, 0]] * 2
 
 
 def test_gives_up_with_a_reason():

@@ -61,21 +61,6 @@ def test_solves_the_fixed_point(control):
         assert state.approach > 1.002 * small.approach
 
 
-@pytest.mark.long
-def test_up_and_down_are_one_path(control):
-    def at(factor, start):
-        lot = {"approach": control.approach, "force": control.force}
-        scaled = {key: value and factor * value for key, value in lot.items()}
-        return MODEL.press(Control(**scaled, tilt=control.tilt), start=start and start.guess)
-
-    up = at(1.0, at(0.5, None))
-    down = at(1.0, at(2.0, None))
-    assert down.force == pytest.approx(up.force, rel=1e-8)
-    assert down.approach == pytest.approx(up.approach, rel=1e-8)
-    assert down.plane.tilt == pytest.approx(up.plane.tilt, abs=1e-9)
-    assert MODEL.press(control).force == pytest.approx(up.force, rel=1e-8)
-
-
 def test_costs_less_than_two_more_solutions(control):
     """Each starts from the last: measured 1.4 … 1.8 times the iterations without slopes.
 

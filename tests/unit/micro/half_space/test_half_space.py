@@ -92,19 +92,9 @@ def test_any_force_and_tilt(force, tilt):
 
 
 def test_refusals(surface):
-    with pytest.raises(InputError, match=r"contact_modulus = 0\.0: must be greater"):
-        HalfSpaceModel(surface=surface, contact_modulus=0.0)
-    with pytest.raises(InputError, match="tolerance = -1: must be greater than 0"):
-        HalfSpaceModel(surface=surface, contact_modulus=1.0, tolerance=-1)
     with pytest.raises(InputError, match="needs a periodic surface"):
         HalfSpaceModel(surface=replace(surface, periodic=False), contact_modulus=1.0, periodic=True)
     free = HalfSpaceModel(surface=surface, contact_modulus=1.0)
-    with pytest.raises(InputError, match="approach = nan: must be a finite number"):
-        free.press(Control(approach=np.nan))
-    with pytest.raises(InputError, match=r"force = -1\.0: must be greater than or equal to 0"):
-        free.press(Control(force=-1.0))
-    with pytest.raises(InputError, match="every patch needs one finite mean height"):
-        respond(free, [1e-3], patches=PATCHES, mean_heights=np.zeros(5))
     other = HalfSpaceModel(surface=rough((24, 48)), contact_modulus=1.0).press(
         Control(approach=0.0)
     )

@@ -94,11 +94,6 @@ def test_plane_turns_under_a_given_approach(model):
     assert np.abs(found.moment).max() <= 1e-8 * HALF * force
 
 
-def test_free_plane_gives_way_where_it_can(model):
-    found = press(model, approach=-APPROACH, tilt=None)
-    assert found.force == 0.0
-
-
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
 def test_no_force_is_first_touch(model, tilt):
     """The plane stands where its slopes let it touch first, which is above no level plane."""
@@ -156,37 +151,6 @@ def test_moment_of_cells():
     x, y = np.meshgrid(SURFACE.x - 0.5, SURFACE.y - 0.45, indexing="ij")
     expected = [(state.pressure * arm).sum() * dx * dy for arm in (x, y)]
     assert found.moment == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", MODEL_NAMES)
-def test_moment_turns_with_the_surface(name):
-    """Mirrored along x the moment about the centre changes its sign along x alone."""
-    mirrored = type(SURFACE)(heights=SURFACE.heights[::-1], lengths=SURFACE.lengths)
-    results = [
-        respond(
-            micro_model(name, surface, contact_modulus=4000.0),
-            [APPROACH],
-            patches=PATCHES,
-            mean_heights=MEANS,
-        ).moment[0]
-        for surface in (SURFACE, mirrored)
-    ]
-    # the spline through periodic and through free heights differs at the border
-    assert results[1] == pytest.approx(results[0] * [-1.0, 1.0], rel=0.02)
-
-
-@pytest.mark.parametrize("model", ["half-space"], indirect=True)  # no model sees them
-@pytest.mark.parametrize(
-    ("approaches", "problem"),
-    [
-        ([[1e-3, 2e-3]], r"\(1, 2\): the approaches are no list"),
-        (["deep"], "not an array of real numbers"),
-        ([1e-3, np.nan], "approach = nan: must be a finite number"),
-    ],
-)
-def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):
-    with pytest.raises(InputError, match=problem):
-        respond(model, approaches, patches=PATCHES, mean_heights=MEANS)
 
 
 @pytest.mark.parametrize("model", ["half-space", "circular"], indirect=True)  # cells, summits
