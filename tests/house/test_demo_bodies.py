@@ -1,12 +1,11 @@
 """The meshes in demos/bodies have the dimensions and names that their scripts say."""
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.waiting_ranks import alone
 from mpi4py import MPI
 
 from patchlaw.macro import compat, planar_face, read_mesh
@@ -18,6 +17,14 @@ BODIES = Path(__file__).parents[2] / "demos" / "bodies"
 SECTOR = (143.0**2 - 100.0**2) / 2.0 * math.radians(56.0)  # of the lining, seen from above
 PLATE = (146.0**2 - 97.0**2) / 2.0 * math.radians(64.0)
 PISTON = math.pi * (22.0**2 - 15.0**2)
+
+
+def meshed(body, size, folder):
+    """Return the file that the script of a body writes."""
+    words = BODIES / f"{body}.py", "--size", size, "--out", folder / "body.msh"
+    done = alone(list(map(str, words)))
+    assert done.returncode == 0, done.stderr
+    return folder / "body.msh"
 
 
 def ring(inner, outer, share=1.0):
@@ -69,10 +76,7 @@ WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim
 )
 def test_bodies_have_their_dimensions(body, tmp_path):
     size, face, volumes, areas = CASES[body]
-    path = tmp_path / "body.msh"
-    words = [sys.executable, BODIES / f"{body}.py", "--size", str(size), "--out", path]
-    subprocess.run(words, check=True, capture_output=True)
-    tagged = read_mesh(path, MPI.COMM_SELF)
+    tagged = read_mesh(meshed(body, size, tmp_path), MPI.COMM_SELF)
     assert set(tagged.cell_names) == set(volumes)
     walls = WALLS.get(body, {})
     assert set(tagged.facet_names) == set(areas) | set(walls)
@@ -104,10 +108,7 @@ FORCES = {"brake_pad": 8e3, "flange": 120e3 - 9.5e3, "seal_ring": 45.0}
 @pytest.mark.long
 @pytest.mark.parametrize("body", CASES)
 def test_scenes_of_bodies_run(body, tmp_path):
-    path = tmp_path / "body.msh"
-    size = 0.8 if body == "seal_ring" else CASES[body][0]
-    words = [sys.executable, BODIES / f"{body}.py", "--size", str(size), "--out", path]
-    subprocess.run(words, check=True, capture_output=True)
+    path = meshed(body, 0.8 if body == "seal_ring" else CASES[body][0], tmp_path)
     small = [*SMALL, f"body.mesh={path}", "law.seeds=[1]", "load.steps=1"]
     history = run(Scene.load(BODIES / f"{body}.toml", small))
     assert history.force_N[-1] == pytest.approx(FORCES[body], rel=1e-6)  # Newton's tolerance
