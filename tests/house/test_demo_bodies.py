@@ -1,13 +1,12 @@
 """The meshes in demos/bodies have the dimensions and names that their scripts say."""
 
 import math
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.waiting_ranks import alone
 from mpi4py import MPI
 
 from patchlaw.macro import compat, planar_face, read_mesh
@@ -72,8 +71,9 @@ def meshed(tmp_path_factory):
     @cache
     def made(body):
         path = tmp_path_factory.mktemp(body) / "body.msh"
-        words = [sys.executable, BODIES / f"{body}.py", "--size", str(CASES[body][0])]
-        subprocess.run([*words, "--out", path], check=True, capture_output=True)
+        words = BODIES / f"{body}.py", "--size", CASES[body][0], "--out", path
+        done = alone(list(map(str, words)))
+        assert done.returncode == 0, done.stderr
         return path
 
     return made

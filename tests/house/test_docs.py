@@ -65,26 +65,12 @@ def columns_of_a_reference():
     return tuple(record.columns(()))
 
 
-@pytest.mark.parametrize(
-    ("file", "columns"),
-    [
-        ("patches.csv", (*PATCH_COLUMNS, "region", *PATCH_MORE)),
-        ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
-        ("reference.csv", columns_of_a_reference()),
-        (
-            "laws.csv",
-            (
-                "ix",
-                "iy",
-                "region",
-                "approach_mm",
-                *CSV_COLUMNS,
-                *FLOW_COLUMNS,
-                "pressure_scatter_MPa",
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize(("file", "columns"), [
+    ("patches.csv", (*PATCH_COLUMNS, "region", *PATCH_MORE)),
+    ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)), ("reference.csv", columns_of_a_reference()),
+    ("laws.csv",
+     ("ix", "iy", "region", "approach_mm", *CSV_COLUMNS, *FLOW_COLUMNS, "pressure_scatter_MPa")),
+])  # fmt: skip
 def test_every_column_is_described(file, columns):
     section = RESULTS.partition(f"\n## `{file}`\n\n")[2].partition("\n\n")[0]
     assert set(re.findall(r"`(\w+)`", section)) == set(columns)

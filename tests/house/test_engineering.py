@@ -1,12 +1,11 @@
 """The page on what engineers read off is true: its scene gives the numbers it prints."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.waiting_ranks import alone
 
 from patchlaw.multiscale import Scene, run
 
@@ -72,8 +71,7 @@ def test_the_leak_on_the_page_is_that_of_its_scene():
 @pytest.mark.long
 def test_python_of_the_page_runs():
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = alone(["-c", example])
+    assert done.returncode == 0, done.stderr
     *_, forth, back = (float(line.split()[-2]) for line in done.stdout.splitlines())
     assert back == pytest.approx(-forth, abs=0.011)  # at half the force all slides, both ways

@@ -1,9 +1,10 @@
 """The page on users' own dolfinx problems is true: its example runs and prints what it says."""
 
 import re
-import subprocess
-import sys
+from contextlib import chdir
 from pathlib import Path
+
+from helpers.waiting_ranks import alone
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
@@ -24,13 +25,12 @@ def test_page_begins_with_the_example_of_the_readme():
 def test_example_its_friction_and_a_ring_print_what_the_page_says(tmp_path):
     assert len([line for line in EXAMPLE.splitlines() if line]) <= 25
     code = f"{EXAMPLE}\n{FIELDS}\nprint('then it slips')\n{FRICTION}\nprint('a ring')\n{RING}"
-    shown = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    with chdir(tmp_path):
+        shown = alone(["-c", code])
     assert shown.returncode == 0, shown.stderr
     assert 'Name="pressure"' in (tmp_path / "face.xdmf").read_text(encoding="utf-8")
-    alone, rubbed = shown.stdout.split("then it slips\n")
-    (line,) = alone.splitlines()
+    pressed, rubbed = shown.stdout.split("then it slips\n")
+    (line,) = pressed.splitlines()
     assert line == re.search(r"It prints `(.*?)`", README).group(1)
     rubbed, ring = rubbed.split("a ring\n")
     assert rubbed.splitlines()[-1] == re.search(r"Its last line is `(.*?)`", PAGE).group(1)

@@ -1,8 +1,8 @@
 """sdist and wheel: what is in them, and that the wheel works where nothing but numpy and scipy is.
 
 A clean copy of the project is built as packagers do, installed in an environment without the
-system's packages, and asked for contacts; then for what it cannot do there. With dolfinx's wheels
-beside it, in an environment of a newer Python, it is asked for all else.
+system's packages, and asked for contacts; then for what it cannot do there. With what scenes need
+beside it, and then with dolfinx's wheels where Python is new enough, it is asked for all else.
 """
 
 import csv
@@ -91,9 +91,9 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def bare(built, tmp_path_factory):
-    """Return an environment that has the wheel, numpy and scipy."""
+    """Return an environment that has the wheel, numpy and scipy; later tests put more into it."""
     folder = tmp_path_factory.mktemp("bare")
-    call("/usr/bin/python3", "-m", "venv", folder, cwd=folder)
+    call(newer_python() or "/usr/bin/python3", "-m", "venv", folder, cwd=folder)
     call(folder / "bin" / "pip", *INSTALL, built[1], cwd=folder)
     return folder
 
@@ -158,16 +158,12 @@ WITH_PIP = "scenes, figures and files need it: pip install 'patchlaw[scenes]'"
 OF_DOLFINX = "bodies of finite elements need it: take dolfinx"
 
 
-@pytest.mark.parametrize(
-    ("code", "missing", "remedy"),
-    [
-        ("patchlaw.Scene", "pydantic", WITH_PIP),
-        ("patchlaw.run", "pydantic", WITH_PIP),
-        ("patchlaw.multiscale.read_laws('laws.h5')", "h5py", WITH_PIP),
-        ("patchlaw.History.plot(None)", "matplotlib", WITH_PIP),
-        ("patchlaw.ContactProblem", "dolfinx", OF_DOLFINX),
-    ],
-)
+@pytest.mark.parametrize(("code", "missing", "remedy"), [
+    ("patchlaw.Scene", "pydantic", WITH_PIP), ("patchlaw.run", "pydantic", WITH_PIP),
+    ("patchlaw.multiscale.read_laws('laws.h5')", "h5py", WITH_PIP),
+    ("patchlaw.History.plot(None)", "matplotlib", WITH_PIP),
+    ("patchlaw.ContactProblem", "dolfinx", OF_DOLFINX),
+])  # fmt: skip
 def test_what_is_missing_is_named(bare, code, missing, remedy):
     words = "-c", f"import patchlaw.multiscale; {code}"
     done = call(bare / "bin" / "python", *words, cwd=bare, check=False)
@@ -248,27 +244,25 @@ def newer_python():
 
 
 @pytest.fixture(scope="module")
-def alone(built, tmp_path_factory):
-    """Return a folder with an environment of wheels alone, and scenes to run there."""
-    if not (python := newer_python()):
+def alone(built, bare):
+    """Return the folder of the environment, now with dolfinx's wheels, and scenes to run there."""
+    if not newer_python():
         pytest.skip("no Python 3.12 or newer")
-    folder = tmp_path_factory.mktemp("alone")
-    call(python, "-m", "venv", "env", cwd=folder)
     words = (f"{built[1]}[fenicsx]", "pytest", "pytest-xdist")
-    installed = call(folder / "env" / "bin" / "pip", *INSTALL, *words, cwd=folder, check=False)
+    installed = call(bare / "bin" / "pip", *INSTALL, *words, cwd=bare, check=False)
     if installed.returncode and any(words in installed.stderr for words in NO_REGISTRY):
         pytest.skip("no registry has dolfinx's wheels for this machine")
     assert not installed.returncode, installed.stderr
     for name in ("my_surface.toml", "ground_steel.txt"):
-        shutil.copy(ROOT / "demos" / "scenes" / name, folder)
-    (folder / "body.toml").write_text(BODY, encoding="utf-8")
-    write_box(folder / "cube.msh", 3 * [np.linspace(0.0, 1.0, 7)])
-    return folder
+        shutil.copy(ROOT / "demos" / "scenes" / name, bare)
+    (bare / "body.toml").write_text(BODY, encoding="utf-8")
+    write_box(bare / "cube.msh", 3 * [np.linspace(0.0, 1.0, 7)])
+    return bare
 
 
 def call_alone(folder, *words, **options):
     """Call a command of the environment, its own first on PATH, without the project's on it."""
-    path = f"{folder / 'env' / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    path = f"{folder / 'bin'}{os.pathsep}{os.environ['PATH']}"
     return call(*words, cwd=folder, **MPI_ENVIRONMENT, PATH=path, PYTHONPATH="", **options)
 
 
@@ -281,7 +275,7 @@ def test_with_the_wheels_of_dolfinx_the_doctor_is_content(alone):
     # in its own cache: a compilation that was killed in the user's would be told
     shown = call_alone(alone, "patchlaw", "doctor", XDG_CACHE_HOME=str(alone)).stdout
     assert "MPICH" in shown and "hypre" not in shown
-    assert f"{alone / 'env' / 'bin' / 'mpirun'}" in shown
+    assert f"{alone / 'bin' / 'mpirun'}" in shown
 
 
 def test_with_the_wheels_of_dolfinx_the_main_scene_runs(alone):
@@ -311,5 +305,5 @@ def test_with_the_wheels_of_dolfinx_a_part_of_the_suite_passes(alone):
         shutil.copytree(ROOT / folder, alone / folder, ignore=kept)
     shutil.copy(ROOT / "pyproject.toml", alone)
     words = ("-q", "-n", "0", *OF_THE_SUITE)
-    shown = call_alone(alone, "env/bin/python", "-P", "-m", "pytest", *words).stdout
+    shown = call_alone(alone, "bin/python", "-P", "-m", "pytest", *words).stdout
     assert " passed" in shown and " failed" not in shown

@@ -177,29 +177,25 @@ class LeakingLaw(PowerLaw):
 
 def leak():
     """Return what leaks over a bent box's face, its balance, and integrals of its pressure."""
-    found = {}
-    for cell in (TETRAHEDRA, HEXAHEDRA):
+    found, several = {}, [LeakingLaw(k) for k in (3e4, 1e4, 5e4, 2e4)]
+    for cell, laws, patches in ((TETRAHEDRA, LeakingLaw(3e4), None), (HEXAHEDRA, several, PATCHES)):
         mesh = box(cells=(6, 5, 3), cell=cell, comm=COMM)
         tags, space = marked(mesh), compat.vector_space(mesh, 1)
         left, right = at(mesh, 0, 0.0), at(mesh, 0, 1.0)
-        for laws in (LeakingLaw(3e4), [LeakingLaw(k) for k in (3e4, 1e4, 5e4, 2e4)]):
-            patches = PATCHES if isinstance(laws, list) else None
-            plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
-            rough, own = pressed_face(space, tags, laws=laws, patches=patches, indenter=plane)
-            own.solve()
-            water = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}
-            flow = rough.leak(left, right, **water)
-            turned = [
-                rough.leak(left, right, **water, axes="polar", centre=one).rate
-                for one in (None, (-0.4, 0.3, 0.0))
-            ]
-            whole = ufl.dx(domain=mesh)
-            moments = [
-                COMM.allreduce(fem.assemble_scalar(fem.form(flow.pressure**k * whole)))
-                for k in (1, 2)
-            ]
-            name = f"{cell.name} {rough.mode}"
-            found[name] = [flow.rate, *moments, *turned], flow.imbalance
+        plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
+        rough, own = pressed_face(space, tags, laws=laws, patches=patches, indenter=plane)
+        own.solve()
+        water = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}
+        flow = rough.leak(left, right, **water)
+        turned = [
+            rough.leak(left, right, **water, axes="polar", centre=one).rate
+            for one in (None, (-0.4, 0.3, 0.0))
+        ]
+        whole = ufl.dx(domain=mesh)
+        moments = [
+            COMM.allreduce(fem.assemble_scalar(fem.form(flow.pressure**k * whole))) for k in (1, 2)
+        ]
+        found[f"{cell.name} {rough.mode}"] = [flow.rate, *moments, *turned], flow.imbalance
     return found
 
 

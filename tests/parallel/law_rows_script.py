@@ -47,12 +47,9 @@ def main():
     for approach in (30e-3, 8e-3):
         model = Counted(micro_model("half-space", surface, contact_modulus=4000.0))
         table = consistent_laws(
-            model,
-            patches,
-            mean_heights=patch_means(surface, patches),
-            largest=Control(approach=approach, tilt=(0.0, 0.0)),
-            comm=COMM,
-        )
+            model, patches, mean_heights=patch_means(surface, patches),
+            largest=Control(approach=approach, tilt=(0.0, 0.0)), comm=COMM,
+        )  # fmt: skip
         solved.append(model.solved)
         hashes.append(hashlib.sha256(law_bytes(table)).hexdigest())
     samples = [

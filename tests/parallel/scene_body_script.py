@@ -91,11 +91,8 @@ def main(folder):
         # errors are differences of forces
         errors = [last.force_N + error for _, error in last.errors]
         found[name] = (
-            last.force_N,
-            last.approach_mm,
-            getattr(last.leak("face"), "rate", 0.0),
-            *errors,
-        )
+            last.force_N, last.approach_mm, getattr(last.leak("face"), "rate", 0.0), *errors,
+        )  # fmt: skip
         if last.shear_force_x_N is not None:
             shear = complex(last.shear_force_x_N, last.shear_force_y_N)
             # a component that is almost zero has no more digits than the other

@@ -2,37 +2,31 @@
 
 import numpy as np
 import pytest
-from helpers.on_ranks import RANKS, OnRanks
+from helpers.on_ranks import RANKS
 
 MODES = ["patchwise", "pointwise"]
 
 
-@pytest.fixture(scope="module")
-def found(waiting_ranks):
-    """Return what was found on every number of ranks."""
-    return OnRanks(waiting_ranks, "block_ranks_script.py")
-
-
 @pytest.mark.parametrize("ranks", RANKS)
-def test_tractions_displace_a_mesh_alike_on_any_ranks(found, ranks):
-    np.testing.assert_allclose(found[ranks]["tractions"], found[1]["tractions"], rtol=1e-10)
+def test_tractions_displace_a_mesh_alike_on_any_ranks(on_ranks, ranks):
+    np.testing.assert_allclose(on_ranks[ranks]["tractions"], on_ranks[1]["tractions"], rtol=1e-10)
 
 
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("case", ["whole", "tets", "one facet"])
-def test_numbers_do_not_depend_on_the_ranks(found, case, mode, ranks):
-    serial, parallel = (found[n][f"{case}, {mode}"] for n in (1, ranks))
+def test_numbers_do_not_depend_on_the_ranks(on_ranks, case, mode, ranks):
+    serial, parallel = (on_ranks[n][f"{case}, {mode}"] for n in (1, ranks))
     for name, value in serial["numbers"].items():
         # residuals of 1e-9 of the load on both sides
         np.testing.assert_allclose(parallel["numbers"][name], value, rtol=1e-8, err_msg=name)
     assert parallel["reaction"] == pytest.approx(parallel["numbers"]["force"], rel=1e-9)
 
 
-@pytest.mark.long
-def test_the_cases_are_what_they_claim(found):
-    assert sorted(found[3]["one facet, pointwise"]["points_of_ranks"])[:2] == [0, 0]
-    shared = found[3]["whole, pointwise"]
+@pytest.mark.slow
+def test_the_cases_are_what_they_claim(on_ranks):
+    assert sorted(on_ranks[3]["one facet, pointwise"]["points_of_ranks"])[:2] == [0, 0]
+    shared = on_ranks[3]["whole, pointwise"]
     assert any(0 < missing < 16 for missing in shared["patches_missing_on_ranks"])
 
 
@@ -59,5 +53,5 @@ HELD_BY_NOTHING = (
     ],
 )
 @pytest.mark.parametrize("ranks", RANKS)
-def test_an_error_reaches_every_rank(found, case, text, ranks):
-    assert found[ranks][case] == [text] * ranks
+def test_an_error_reaches_every_rank(on_ranks, case, text, ranks):
+    assert on_ranks[ranks][case] == [text] * ranks

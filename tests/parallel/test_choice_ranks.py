@@ -1,21 +1,15 @@
 """What an accuracy leaves open becomes the same on any number of ranks."""
 
 import pytest
-from helpers.on_ranks import RANKS, OnRanks
-
-
-@pytest.fixture(scope="module")
-def found(waiting_ranks):
-    """Return the resolved keys, the sentence about them and the error, by the number of ranks."""
-    return OnRanks(waiting_ranks, "choice_ranks_script.py")
+from helpers.on_ranks import RANKS
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("body", ["block", "plate"])
-def test_a_choice_does_not_depend_on_the_number_of_ranks(found, body, ranks):
-    alone = found[1][0][body]
-    more = [one[body] for one in found[ranks]]
+def test_a_choice_does_not_depend_on_the_number_of_ranks(on_ranks, body, ranks):
+    alone = on_ranks[1][0][body]
+    more = [one[body] for one in on_ranks[ranks]]
     if body == "block":
         assert alone[0]["coupling.kind"] == "concurrent"
     else:

@@ -2,13 +2,6 @@
 
 import numpy as np
 import pytest
-from helpers.on_ranks import OnRanks
-
-
-@pytest.fixture(scope="module")
-def forces(waiting_ranks):
-    """Return the forces by every solver, on every number of ranks."""
-    return OnRanks(waiting_ranks, "direct_solvers_script.py")
 
 
 @pytest.mark.parametrize(
@@ -18,8 +11,8 @@ def forces(waiting_ranks):
         *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("superlu", "mumps", "bjacobi")),
     ],
 )
-def test_forces_are_those_of_multigrid(forces, choice, ranks):
-    usual, found = forces[1]["usual"], forces[ranks][choice]
+def test_forces_are_those_of_multigrid(on_ranks, choice, ranks):
+    usual, found = on_ranks[1]["usual"], on_ranks[ranks][choice]
     assert len(found) == (8 if ranks == 1 else 4 if choice == "mumps" else 2)
     for name in found:
         # Newton's method and the equilibrium of the plane end at 1e-9 of the force

@@ -1,14 +1,8 @@
 """Rough interfaces in a user's problem on 1 to 3 ranks: the block's own forces, everywhere."""
 
 import pytest
-from helpers.on_ranks import OnRanks
 
 RANKS = [1, 2, pytest.param(3, marks=pytest.mark.slow)]
-
-
-@pytest.fixture(scope="module")
-def on_ranks(waiting_ranks):
-    return OnRanks(waiting_ranks, "interface_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)

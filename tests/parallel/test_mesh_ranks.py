@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from helpers.on_ranks import OnRanks
 from scipy import ndimage
 
 CASES = {  # volume, bottom, sides; areas of the top and the patches follow
@@ -17,16 +16,10 @@ MORE = [2, pytest.param(4, marks=pytest.mark.slow)]
 """Two ranks, and so many that some have no cells."""
 
 
-@pytest.fixture(scope="module")
-def found(waiting_ranks):
-    """Return what was found on every number of ranks."""
-    return OnRanks(waiting_ranks, "mesh_ranks_script.py")
-
-
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_meshes_are_the_same(found, case, ranks):
-    meshes = [found[n][case] for n in (1, ranks)]
+def test_meshes_are_the_same(on_ranks, case, ranks):
+    meshes = [on_ranks[n][case] for n in (1, ranks)]
     assert all(mesh["exact"] == meshes[0]["exact"] for mesh in meshes)
     volume, bottom, sides = CASES[case]
     for mesh in meshes:
@@ -40,39 +33,42 @@ def test_meshes_are_the_same(found, case, ranks):
 
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_solutions_are_the_same(found, case, ranks):
-    work = [found[n][case]["measures"]["work"] for n in (1, ranks)]
+def test_solutions_are_the_same(on_ranks, case, ranks):
+    work = [on_ranks[n][case]["measures"]["work"] for n in (1, ranks)]
     # the same matrix but for the order of sums; the solver leaves 1e-10, the work its square
     np.testing.assert_allclose(work, work[0], rtol=1e-12)
     assert work[0] > 0.0
 
 
 @pytest.mark.parametrize("ranks", MORE)
-def test_supports_hold_nodes_on_every_rank(found, ranks):
+def test_supports_hold_nodes_on_every_rank(on_ranks, ranks):
     # dealt out, a rank can meet a support in a node alone, whose facets all belong to others
-    whole = found[1]["box"]["measures"]
-    for measures in found[ranks]["dealt"]:
+    whole = on_ranks[1]["box"]["measures"]
+    for measures in on_ranks[ranks]["dealt"]:
         assert measures["unknowns"] == whole["unknowns"]
         assert measures["work"] == pytest.approx(whole["work"], rel=1e-12)  # as above
 
 
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_cells_are_spread_without_ghosts(found, case, ranks):
-    lattice = found[ranks][case]
+def test_cells_are_spread_without_ghosts(on_ranks, case, ranks):
+    lattice = on_ranks[ranks][case]
     assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
 
 
-@pytest.mark.long
-def test_cells_are_spread_in_boxes(found):
-    assert found[2]["quadratic hexahedra"]["cells_of_ranks"] == [8, 4]
-    assert sorted(found[4]["rod"]["cells_of_ranks"]) == [0, 0, 1, 1]
-    assert sorted(found[4]["box"]["cells_of_ranks"]) == [0, 0, 0, 6]
+def test_cells_are_spread_in_boxes(on_ranks):
+    assert on_ranks[2]["quadratic hexahedra"]["cells_of_ranks"] == [8, 4]
+
+
+@pytest.mark.slow
+def test_some_of_four_ranks_have_no_cells(on_ranks):
+    assert sorted(on_ranks[4]["rod"]["cells_of_ranks"]) == [0, 0, 1, 1]
+    assert sorted(on_ranks[4]["box"]["cells_of_ranks"]) == [0, 0, 0, 6]
 
 
 @pytest.mark.parametrize("ranks", [1, *MORE])
-def test_regions_of_contact_go_on_across_ranks(found, ranks):
-    result = found[ranks]["regions"]
+def test_regions_of_contact_go_on_across_ranks(on_ranks, ranks):
+    result = on_ranks[ranks]["regions"]
     # facets connect all of their four nodes: each node to the eight around it
     expected = [ndimage.label(pattern, np.ones((3, 3)))[1] for pattern in result["patterns"]]
     assert result["found"] == expected

@@ -1,18 +1,11 @@
 """The solvers of blocks are the same methods on 1, 2 and 3 ranks."""
 
 import pytest
-from helpers.on_ranks import OnRanks
 from helpers.petsc_build import ALGEBRAIC
 
 pytestmark = pytest.mark.slow
 RANKS = [3]
 """Two ranks share what three do; odd numbers cut meshes less evenly."""
-
-
-@pytest.fixture(scope="module")
-def found(waiting_ranks):
-    """Return what was found on every number of ranks."""
-    return OnRanks(waiting_ranks, "multigrid_ranks_script.py")
 
 
 KINDS = {
@@ -26,8 +19,8 @@ KINDS = {
 
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("case", KINDS)
-def test_solves_do_not_depend_on_the_ranks(found, case, ranks):
-    serial, parallel = (found[n][case] for n in (1, ranks))
+def test_solves_do_not_depend_on_the_ranks(on_ranks, case, ranks):
+    serial, parallel = (on_ranks[n][case] for n in (1, ranks))
     assert serial["preconditioner"] == parallel["preconditioner"] == KINDS[case]
     # residuals of 1e-10 on both sides, seen through the condition of a small block
     assert parallel["norm"] == pytest.approx(serial["norm"], rel=1e-8)
@@ -41,5 +34,5 @@ def test_solves_do_not_depend_on_the_ranks(found, case, ranks):
 @pytest.mark.parametrize(
     "case", [case for case in KINDS if "refined" not in case and "part" not in case]
 )
-def test_coarser_matrices_are_galerkin_products(found, case, ranks):
-    assert found[ranks][case]["missed"] < 1e-13  # rounding of a few hundred terms
+def test_coarser_matrices_are_galerkin_products(on_ranks, case, ranks):
+    assert on_ranks[ranks][case]["missed"] < 1e-13  # rounding of a few hundred terms

@@ -70,14 +70,3 @@ def test_same_numbers_on_any_number_of_ranks(waiting_ranks, root, tmp_path, scen
     for one, more in zip(*results, strict=True):
         # residuals of 1e-10 of the contact forces; the area's border follows them
         assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
-
-
-def test_refusal_ends_all_ranks_with_one_message(waiting_ranks, tmp_path):
-    out = tmp_path / "out"
-    low = "surface.spectrum.rms_slope=1.9", "block.height=0.2 mm"
-    words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *low)
-    done = waiting_ranks(2, *words, timeout=60)
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.count("patchlaw: ") == 1
-    assert "valley of the roughness is too deep" in done.stderr
-    assert not out.exists()

@@ -50,11 +50,11 @@ def test_ranks_share_the_cases(waiting_ranks, tmp_path, words, ranks):
 def test_a_killed_sweep_goes_on_with_other_ranks(waiting_ranks, tmp_path, words):
     one, out = tmp_path / "one", tmp_path / "out"
     assert main([*words, "--out", str(one)]) == 0
-    assert waiting_ranks(3, "-m", "patchlaw", *words, "--out", str(out)).returncode == 0
-    first, second, third = journals(out)
+    assert waiting_ranks(2, "-m", "patchlaw", *words, "--out", str(out)).returncode == 0
+    first, second = journals(out)
     first.write_bytes(first.read_bytes()[:-30])  # as a kill leaves it
+    first.rename(first.with_name("rank-9.cases"))  # of a job with more ranks
     second.write_bytes(second.read_bytes()[:20])  # not even its header is whole
-    third.rename(third.with_name("rank-9.cases"))  # of a job with more ranks
     for table in out.glob("*.csv"):
         table.unlink()
     assert waiting_ranks(2, "-m", "patchlaw", *words, "--out", str(out)).returncode == 0

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from helpers.on_ranks import OnRanks
 
 CASES = ("2.2", "4.1", "written", "xdmf")
 MORE = [2, pytest.param(3, marks=pytest.mark.slow)]
@@ -16,16 +15,10 @@ EXPECTED = {
 }
 
 
-@pytest.fixture(scope="module")
-def found(waiting_ranks):
-    """Return what was found on every number of ranks."""
-    return OnRanks(waiting_ranks, "tagged_ranks_script.py")
-
-
 @pytest.mark.parametrize("ranks", [1, *MORE])
 @pytest.mark.parametrize("case", CASES)
-def test_bodies_are_whole(found, case, ranks):
-    body = found[ranks][case]
+def test_bodies_are_whole(on_ranks, case, ranks):
+    body = on_ranks[ranks][case]
     if case == "xdmf":
         assert body["volumes"] == pytest.approx({"3": 24.0, "8": 24.0}, rel=1e-13)  # round-off
         areas = {
@@ -40,8 +33,8 @@ def test_bodies_are_whole(found, case, ranks):
 
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_ranks_agree(found, case, ranks):
-    one, more = found[1][case], found[ranks][case]
+def test_ranks_agree(on_ranks, case, ranks):
+    one, more = on_ranks[1][case], on_ranks[ranks][case]
     assert one["motions"] == more["motions"] == ["translation along y"]
     assert one["parts"] == more["parts"]
     for name, face in one["faces"].items():
@@ -50,16 +43,17 @@ def test_ranks_agree(found, case, ranks):
 
 @pytest.mark.parametrize("ranks", [1, *MORE])
 @pytest.mark.parametrize("name", EXPECTED)
-def test_all_ranks_raise_one_error(found, name, ranks):
-    (message,) = found[ranks]["errors"][name]
+def test_all_ranks_raise_one_error(on_ranks, name, ranks):
+    (message,) = on_ranks[ranks]["errors"][name]
     assert EXPECTED[name] in message and message.startswith(f"/{name}: ")
 
 
 @pytest.mark.parametrize("ranks", [1, *MORE])
-def test_folded_cells_are_found_across_ranks(found, ranks):
-    assert found[ranks]["pushed"] == found[1]["pushed"] != "0"
+def test_folded_cells_are_found_across_ranks(on_ranks, ranks):
+    assert on_ranks[ranks]["pushed"] == on_ranks[1]["pushed"] != "0"
 
 
-@pytest.mark.long
-def test_ranks_may_have_no_facet_of_a_face(found):
-    assert any(0 in found[ranks][case]["first_face_of_ranks"] for ranks in (2, 3) for case in CASES)
+@pytest.mark.slow
+def test_ranks_may_have_no_facet_of_a_face(on_ranks):
+    found = [on_ranks[ranks][case] for ranks in (2, 3) for case in CASES]
+    assert any(0 in each["first_face_of_ranks"] for each in found)

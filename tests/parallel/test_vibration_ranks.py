@@ -2,12 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.on_ranks import RANKS, OnRanks
-
-
-@pytest.fixture(scope="module")
-def on_ranks(waiting_ranks):
-    return OnRanks(waiting_ranks, "vibration_ranks_script.py")
+from helpers.on_ranks import RANKS
 
 
 @pytest.mark.parametrize("ranks", RANKS)

@@ -44,31 +44,30 @@ def call(home, *words, compiler=None):
 
 @pytest.fixture(scope="module")
 def warmed(tmp_path_factory):
-    """A cache that `patchlaw warm` filled."""
+    """A cache that two `patchlaw warm` filled at once, and how they ended."""
     home = tmp_path_factory.mktemp("cache")
     left = home / "patchlaw" / "forms" / "libffcx_forms_left.c"
     left.parent.mkdir(parents=True)
     left.touch()
     os.utime(left, (0, 0))
-    done = call(home, "warm")
-    assert done.returncode == 0, done.stderr
+    begun = [begin(home, "warm", "--element", "Q1", "P2") for _ in range(2)]
+    ended = [end(process) for process in begun]
     assert not left.exists()
-    return home
+    return home, ended
 
 
 @pytest.mark.parametrize("scene", COUPLINGS.values(), ids=COUPLINGS)
 def test_runs_need_no_compiler_afterwards(warmed, tmp_path, scene):
     words = ("run", SCENE, "--out", tmp_path / "out", "--set", *SMALL, *scene)
-    done = call(warmed, *words, compiler="/bin/false")
+    done = call(warmed[0], *words, compiler="/bin/false")
     assert done.returncode == 0, done.stderr
 
 
-def test_processes_that_want_the_same_forms_at_once_do_not_harm_each_other(tmp_path):
-    begun = [begin(tmp_path, "warm", "--element", "Q1") for _ in range(2)]
-    ended = [end(process) for process in begun]
+def test_processes_that_want_the_same_forms_at_once_do_not_harm_each_other(warmed):
+    home, ended = warmed
     assert [done.returncode for done in ended] == [0, 0], [done.stderr for done in ended]
     assert len({done.stdout for done in ended}) == 1  # as many forms for all
-    assert not list((tmp_path / "patchlaw" / "forms").glob("*.tmp*"))
+    assert not list((home / "patchlaw" / "forms").glob("*.tmp*"))
 
 
 def test_without_warming_the_same_run_says_what_to_do(tmp_path):

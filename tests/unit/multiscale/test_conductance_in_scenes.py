@@ -65,36 +65,6 @@ def test_heat_and_current_pass_alike():
     np.testing.assert_allclose(ratio, 1.0 / 1.7e-8 / 80.0, rtol=1e-12)
 
 
-@pytest.mark.long
-def test_a_block_is_no_part_of_what_the_interface_conducts():
-    """One force in all couplings; with 2 waves on the face a block changes a part of its gaps."""
-    force, found = {"force": "4 N", "steps": 2}, []
-    surface = {**scene().written["surface"], "grid": [48, 48]}
-    for kind in ("analytic", "concurrent", "consistent"):
-        history = run(scene(kind, load=force, surface=surface, patches={"grid": [1, 1]}))
-        found.append(history.thermal_conductance_W_per_K)
-    np.testing.assert_allclose(found[1], found[0], rtol=0.12)
-    np.testing.assert_allclose(found[2], found[1], rtol=0.03)  # cells enter one by one
-
-
-@pytest.mark.long
-def test_laws_are_as_stiff_as_cells_next_to_full_contact():
-    spectrum = {"hurst": 0.8, "waves": [1, 5], "rms_slope": 0.05, "seed": 3}
-    given = {
-        "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
-        "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
-        "load": {"force": ["6970 N", "10459 N", "12000 N"], "steps": 1},
-        "patches": {"grid": [1, 1]},
-    }
-    laws, cells = (
-        run(scene(**given, coupling={"kind": kind})) for kind in ("consistent", "concurrent")
-    )
-    assert cells.contact_area_fraction[-1] > 0.98
-    ratio = laws.thermal_conductance_W_per_K / cells.thermal_conductance_W_per_K
-    # cells lose contact one by one: their slope jumps by 5 % from one to the next
-    np.testing.assert_allclose(ratio, 1.0, rtol=0.1)
-
-
 @pytest.mark.parametrize("kind", ["consistent", pytest.param("isolated", marks=pytest.mark.long)])
 def test_patch_laws_conduct_by_the_stiffness_of_their_interface(kind):
     near = {"approach": ["0.00796 mm", "0.008 mm", "0.00804 mm"], "steps": 1}

@@ -33,15 +33,11 @@ def ran(*given):
     return run(scene(*given))
 
 
-@pytest.mark.parametrize(
-    ("kind", "model", "fields"),
-    [
-        ("analytic", "half-space", True),
-        ("analytic", "elliptic", False),
-        ("concurrent", "half-space", True),
-        pytest.param("reference", "half-space", True, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("kind", "model", "fields"), [
+    ("analytic", "half-space", True), ("analytic", "elliptic", False),
+    ("concurrent", "half-space", True),
+    pytest.param("reference", "half-space", True, marks=pytest.mark.long),
+])  # fmt: skip
 def test_last_contact_is_recorded(kind, model, fields):
     history = ran(kind, model)
     contact, last = history.contact, history.steps[-1]
@@ -57,14 +53,11 @@ def test_last_contact_is_recorded(kind, model, fields):
         assert contact.pressure_MPa.mean() == pytest.approx(last.mean_pressure_MPa, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("kind", "sections"),
-    [
-        ("analytic", {"conductance": {"resistivity": ["1e-7 ohm m", "1e-7 ohm m"]}}),
-        pytest.param("consistent", {}, marks=pytest.mark.long),
-        pytest.param("reference", {}, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("kind", "sections"), [
+    ("analytic", {"conductance": {"resistivity": ["1e-7 ohm m", "1e-7 ohm m"]}}),
+    pytest.param("consistent", {}, marks=pytest.mark.long),
+    pytest.param("reference", {}, marks=pytest.mark.long),
+])  # fmt: skip
 @pytest.mark.parametrize("last", ["force", "approach"])
 def test_what_vanishes_without_contact_has_no_error(kind, sections, last):
     """By one rule; the approach of a plane without a force is any, and so is the mean gap."""

@@ -10,12 +10,9 @@ import patchlaw
 from patchlaw import geometry, macro, micro, multiscale, support
 
 PACKAGES = {
-    "support": support,
-    "geometry": geometry,
-    "micro": micro,
-    "multiscale": multiscale,
+    "support": support, "geometry": geometry, "micro": micro, "multiscale": multiscale,
     "macro": macro,
-}
+}  # fmt: skip
 
 
 def test_names_are_those_of_the_packages():

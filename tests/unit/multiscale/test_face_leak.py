@@ -157,24 +157,15 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     done.close()
 
 
-@pytest.mark.parametrize(
-    ("leak", "text"),
-    [
-        (OIL | {"inlet": "lefd"}, r"leak\.inlet = 'lefd'.*did you mean 'left'"),
-        (OIL | {"outlet": "bottom"}, "leak: the outlet has no edge in common with the contact"),
-        (OIL | {"outlet": "front"}, "leak: inlet and outlet touch each other"),
-        (OIL | {"outlet": "left"}, r"leak\.outlet = 'left': is the inlet"),
-        (OIL | {"direction": "x"}, "leak: 'direction' does not go with edges"),
-        (
-            {key: OIL[key] for key in ("viscosity", "pressures", "inlet")},
-            r"leak\.outlet: is missing",
-        ),
-        (
-            {key: OIL[key] for key in ("viscosity", "pressures")},
-            r"leak\.inlet: is required with law",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("leak", "text"), [
+    (OIL | {"inlet": "lefd"}, r"leak\.inlet = 'lefd'.*did you mean 'left'"),
+    (OIL | {"outlet": "bottom"}, "leak: the outlet has no edge in common with the contact"),
+    (OIL | {"outlet": "front"}, "leak: inlet and outlet touch each other"),
+    (OIL | {"outlet": "left"}, r"leak\.outlet = 'left': is the inlet"),
+    (OIL | {"direction": "x"}, "leak: 'direction' does not go with edges"),
+    ({key: OIL[key] for key in ("viscosity", "pressures", "inlet")}, r"leak\.outlet: is missing"),
+    ({key: OIL[key] for key in ("viscosity", "pressures")}, r"leak\.inlet: is required with law"),
+])  # fmt: skip
 def test_bad_edges(box, leak, text):
     with pytest.raises(InputError, match=text):
         Run(scene(box, leak))

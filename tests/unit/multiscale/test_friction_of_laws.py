@@ -37,20 +37,6 @@ def scene(kind="consistent", *, load=LOAD, friction=MU, **sections):
     return Scene.from_dict(data | {"block": CUBE} | patches | sections)
 
 
-@pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """Return what a coupling's run found, and its checkpoint after load step 4."""
-    known, folder = {}, tmp_path_factory.mktemp("runs")
-
-    def found(kind):
-        path = folder / f"{kind}.state"
-        if kind not in known:
-            known[kind] = ran_past(scene(kind), 4, path).history()
-        return known[kind], path
-
-    return found
-
-
 @pytest.mark.long
 def test_full_sliding_is_the_coefficient_times_the_force():
     far = {"force": "2.1 N", "steps": 1, "shear": [["5 um", "2 um"]], "shear_steps": 1}
@@ -81,12 +67,9 @@ def test_the_stiffness_is_that_of_a_small_shift_back():
 @pytest.mark.long
 def test_a_shear_force_is_prescribed_under_a_free_plane():
     load = {
-        "force": ["1 N", "2 N"],
-        "steps": 1,
-        "tilt": "free",
-        "shear_force": [["0.1 N", "0 N"], ["0.2 N", "-0.3 N"]],
-        "shear_path": "along",
-    }
+        "force": ["1 N", "2 N"], "steps": 1, "tilt": "free",
+        "shear_force": [["0.1 N", "0 N"], ["0.2 N", "-0.3 N"]], "shear_path": "along",
+    }  # fmt: skip
     history = run(scene(load=load))
     assert history.shear_force_x_N == pytest.approx([0.1, 0.2], abs=1e-9)
     assert history.shear_force_y_N == pytest.approx([0.0, -0.3], abs=1e-9)
@@ -96,9 +79,9 @@ def test_a_shear_force_is_prescribed_under_a_free_plane():
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["consistent", "representative"])
-def test_a_run_goes_on_with_its_sliders(ran, kind):
-    whole, path = ran(kind)
-    _, rest = gone_on(scene(kind), path)
+def test_a_run_goes_on_with_its_sliders(tmp_path, kind):
+    whole = ran_past(scene(kind), 4, tmp_path / "run.state").history()
+    _, rest = gone_on(scene(kind), tmp_path / "run.state")
     assert [step.step for step in rest] == [5, 6, 7]
     for name in ("shear_force_x_N", "shear_force_y_N", "dissipated_mJ", "force_N"):
         found = [getattr(step, name) for step in rest]
@@ -183,13 +166,3 @@ def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())
     whole.close()
-
-
-@pytest.mark.slow
-def test_errors_of_the_shear_of_a_representative_law_are_measured():
-    load = {"force": "42 N", "steps": 1, "shear": [["0.4 um", "0 um"]], "shear_steps": 1}
-    output = {"check": "last", "figures": False, "report": False}
-    step = run(scene("representative", load=load, output=output)).steps[-1]
-    errors = dict(step.shear_errors)
-    assert step.shear_force_error_N == pytest.approx(sum(errors.values()))
-    assert errors["grid"] > 0.0 and np.isfinite(list(errors.values())).all()

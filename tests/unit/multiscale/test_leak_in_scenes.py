@@ -243,11 +243,11 @@ def test_grids_err_in_laws_of_one_patch_as_in_cells():
             assert dict(found.causes)["grid"] == pytest.approx(known.error, rel=0.05)
 
 
-def test_patches_with_too_few_cells_are_refused():
-    with pytest.raises(
-        InputError, match=r"patches.grid = \[9, 2\]: leaves patches fewer than 4 ce"
-    ):
-        Run(scene(kind="consistent", patches={"grid": [9, 2]}))
+@pytest.mark.parametrize(("patches", "micro"), [([9, 2], {}), ([8, 8], {"cells": [16, 16]})])
+def test_patches_with_too_few_cells_are_refused(patches, micro):
+    match = rf"patches.grid = \[{patches[0]}, {patches[1]}\]: leaves patches fewer than 4 ce"
+    with pytest.raises(InputError, match=match):
+        Run(scene(kind="consistent", patches={"grid": patches}, micro=micro))
 
 
 @pytest.mark.slow
@@ -272,9 +272,3 @@ def test_scenes_that_do_not_ask_have_no_leak():
     history = run(scene(None))
     assert all(np.isnan(getattr(history, name)).all() for name in NAMES)
     assert not any("leak" in note for note in history.notes)
-
-
-def test_patches_of_too_few_cells_are_refused():
-    few = scene(kind="consistent", patches={"grid": [8, 8]}, micro={"cells": [16, 16]})
-    with pytest.raises(InputError, match=r"patches.grid = \[8, 8\]: leaves patches fewer than"):
-        Run(few)

@@ -74,12 +74,9 @@ def test_nodes_of_a_job():
     job = Job("aabbbc", [64 * GB, 64 * GB, 32 * GB, 48 * GB, 48 * GB, 64 * GB])
     assert cluster_nodes(job) == ClusterNodes(ranks=(2, 3, 1), memory=32 * GB)
     assert job.freed == 1  # communicators are few
-    assert (
-        cluster_nodes(None)
-        == cluster_nodes(Job("a"))
-        == ClusterNodes()
-        == ClusterNodes(memory=memory_of_this_node())
-    )
+    assert (cluster_nodes(None) == cluster_nodes(Job("a")) == ClusterNodes() == ClusterNodes(
+        memory=memory_of_this_node(),
+    ))  # fmt: skip
 
 
 def test_a_block_of_many_nodes_is_let_through_there():
@@ -234,23 +231,17 @@ sys.exit(main(sys.argv[2:]))
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("megabytes", "text"),
-    [
-        (900, "ulimit -v = 921600: the address space of a process is limited to less than"),
-        (2000, r"of memory (allowed: what fits into one node of .* GB, 1.1 GB for a process"),
-    ],
-)
+@pytest.mark.parametrize(("megabytes", "text"), [
+    (900, "ulimit -v = 921600: the address space of a process is limited to less than"),
+    (2000, r"of memory (allowed: what fits into one node of .* GB, 1.1 GB for a process"),
+])  # fmt: skip
 def test_address_space(root, megabytes, text):
     """OpenBLAS asked for its buffers for ever where there was none left."""
     words = ["plan", str(PAPER), "--set", "surface.grid=[3400, 3400]"]
     done = subprocess.run(
-        [sys.executable, "-c", LIMITED, str(megabytes), *words],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        [sys.executable, "-c", LIMITED, str(megabytes), *words], cwd=root, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 2
     assert re.search(text.replace("(", r"\("), done.stderr), done.stderr
 

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 from helpers.along import respond
+from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.geometry import Asperities, PatchGrid
 from patchlaw.micro import AsperityModel, HalfSpaceModel
@@ -83,29 +84,19 @@ def _toml(value) -> str:
     return json.dumps(value)
 
 
-@pytest.mark.slow
-def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(loaded):
+def test_modules_are_loaded_by_what_takes_them_alone(loaded):
+    """No finite elements but for tetrahedra and natural modes; laws and pictures where asked."""
     for name in ("plan", "run", "accuracy"):
         assert not loaded[name].intersection(FINITE_ELEMENTS + PICTURES), name
-
-
-def test_a_scene_without_laws_loads_neither_laws_nor_what_only_they_take(loaded):
     rest = "models.measured_errors.samples", "models.loaded_patches", "runs.output.view"
     unused = {f"patchlaw.multiscale.{name}" for name in rest}
     names = {name for name in loaded["run"] if name.startswith("patchlaw.multiscale.laws.")}
     assert not names | (loaded["run"] & unused)
-
-
-def test_only_laws_on_tetrahedra_load_finite_elements(loaded):
     for name in ("concurrent", "hexahedra"):
         assert not loaded[name].intersection(("dolfinx", "petsc4py")), name
     assert {"dolfinx", "petsc4py"} <= loaded["tetrahedra"]
     vibration = {"patchlaw.multiscale.observers.vibration", "patchlaw.macro.eigenmodes"}
-    assert not loaded["tetrahedra"] & vibration
-
-
-def test_figures_load_the_pictures_that_others_do_without(loaded):
-    assert not loaded["tetrahedra"].intersection(PICTURES)
+    assert not loaded["tetrahedra"] & (vibration | set(PICTURES))
     assert loaded["surface"].issuperset(PICTURES)
 
 
@@ -208,14 +199,8 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
 
 
 def test_a_run_writes_what_it_took(tmp_path, capsys):
-    path = tmp_path / "scene.json.toml"
-    path.write_text(
-        "[surface]\nspectrum = {hurst = 0.9, waves = [2, 4], rms_slope = 0.1}\n"
-        "grid = [32, 32]\nlengths = [1.0, 1.0]\n[block]\nyoung_modulus = 4000.0\n"
-        'poisson_ratio = 0.3\n[micro]\nmodel = "half-space"\n[coupling]\nkind = "analytic"\n'
-        "[load]\napproach = 0.004\nsteps = 2\n[output]\nfigures = false\n"
-    )
-    assert main(["run", str(path), "--out", str(tmp_path / "results")]) == 0
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
+    assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "results")]) == 0
     printed = capsys.readouterr().out
     assert ": surface" in printed.partition("took ")[2]
     assert "memory" in printed

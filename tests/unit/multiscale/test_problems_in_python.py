@@ -48,13 +48,10 @@ def forces(steps):
     return np.array([[one.approach_mm, one.force_N, one.contact_area_fraction] for one in steps])
 
 
-@pytest.mark.parametrize(
-    ("kind", "body", "path"),
-    [
-        ("concurrent", ElasticBlock(RUBBER, height=0.7), {"force": [3.0, 1.0], "steps": 2}),
-        ("analytic", RUBBER, {"approach": [0.004], "steps": 2, "tilt": "free"}),
-    ],
-)
+@pytest.mark.parametrize(("kind", "body", "path"), [
+    ("concurrent", ElasticBlock(RUBBER, height=0.7), {"force": [3.0, 1.0], "steps": 2}),
+    ("analytic", RUBBER, {"approach": [0.004], "steps": 2, "tilt": "free"}),
+])  # fmt: skip
 def test_cells_in_contact_are_those_of_a_scene(kind, body, path):
     loads = {key: tuple(v) if isinstance(v, list) else v for key, v in path.items()}
     steps = Problem(CellContact.of(surface(), body), LoadHistory(**loads)).steps()
@@ -66,14 +63,10 @@ def test_cells_in_contact_are_those_of_a_scene(kind, body, path):
 @pytest.mark.long
 def test_friction_and_hardness_are_those_of_a_scene():
     path = {"force": [3.0], "steps": 1, "shear": [[1e-4, 0.0]], "shear_steps": 2}
-    wanted = run(
-        scene(
-            "concurrent",
-            path,
-            micro={"hardness": 300.0},
-            friction={"coefficient": 0.3, "coupled": False},
-        )
-    ).steps
+    wanted = run(scene(
+        "concurrent", path, micro={"hardness": 300.0},
+        friction={"coefficient": 0.3, "coupled": False},
+    )).steps  # fmt: skip
     model = CellContact.of(
         surface(), ElasticBlock(RUBBER, height=0.7), hardness=300.0, friction=0.3
     )
@@ -97,20 +90,15 @@ def test_patches_with_laws_are_those_of_a_scene():
     np.testing.assert_allclose(forces(steps), forces(wanted), rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: ElasticBlock(RUBBER, height=-1.0), "height"),
-        (lambda: ElasticBlock(RUBBER, height=1.0, sides="glued"), "sides"),
-        (lambda: CellContact.of(surface(), "steel"), "body"),
-        (
-            lambda: CellContact.of(surface(), ElasticBlock(RUBBER, height=0.7), periodic=True),
-            "body: does not continue periodically",
-        ),
-        (lambda: CellContact.of(surface(), RUBBER, friction=-0.3), "friction"),
-        (lambda: CellContact.of(surface(rms_slope=1.2), RUBBER), "0.8"),
-    ],
-)
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: ElasticBlock(RUBBER, height=-1.0), "height"),
+    (lambda: ElasticBlock(RUBBER, height=1.0, sides="glued"), "sides"),
+    (lambda: CellContact.of(surface(), "steel"), "body"),
+    (lambda: CellContact.of(surface(), ElasticBlock(RUBBER, height=0.7), periodic=True),
+     "body: does not continue periodically"),
+    (lambda: CellContact.of(surface(), RUBBER, friction=-0.3), "friction"),
+    (lambda: CellContact.of(surface(rms_slope=1.2), RUBBER), "0.8"),
+])  # fmt: skip
 def test_what_does_not_fit_is_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()

@@ -13,15 +13,11 @@ BLOCK = {"height": 1.0, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells":
 
 def scene(kind):
     laws = {"table_tolerance": 0.05} if kind == "consistent" else {}
-    return Scene.from_dict(
-        {
-            "surface": {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]},
-            "block": BLOCK,
-            "coupling": {"kind": kind} | laws,
-            "load": {"approach": 0.006, "steps": 3},
-            "output": {"check": "none"},
-        }
-    )
+    return Scene.from_dict({
+        "surface": {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}, "block": BLOCK,
+        "coupling": {"kind": kind} | laws, "load": {"approach": 0.006, "steps": 3},
+        "output": {"check": "none"},
+    })  # fmt: skip
 
 
 @cache

@@ -21,18 +21,11 @@ def setup(
     spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
     material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 5]}
     micro = {"model": model} | ({} if slopes is None else {"finite_slopes": slopes})
-    return make_setup(
-        Scene.from_dict(
-            {
-                "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
-                "block": material | block,
-                "patches": {"grid": [patches, patches]},
-                "micro": micro,
-                "coupling": {"kind": kind} | (coupling or {}),
-                "load": {"approach": approach},
-            }
-        )
-    )
+    return make_setup(Scene.from_dict({
+        "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
+        "block": material | block, "patches": {"grid": [patches, patches]}, "micro": micro,
+        "coupling": {"kind": kind} | (coupling or {}), "load": {"approach": approach},
+    }))  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -69,19 +69,6 @@ def test_files_of_the_user_end_a_command_before_it_begins(folder, capsys, comman
         mine.unlink()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
-def test_results_are_replaced_until_somebody_changes_them(folder, capsys, command):
-    words = words_of(command)
-    for _ in range(2):
-        assert main(words) in (0, 3)  # a comparison of a second reaches no measure
-    name = next(name for name in COMMANDS[command][1] if (folder / name).is_file())
-    put(folder, name, (folder / name).read_bytes() + b" ")
-    capsys.readouterr()
-    assert main(words) == 2
-    assert f"holds {name}, which is no result" in capsys.readouterr().err
-
-
 def test_overwrite_takes_no_more_than_it_needs(folder):
     mine = [put(folder, name) for name in ("fields.bp/data.0", "leak.png", "laws_4c/law_1.py")]
     mine += [put(folder, name) for name in (".notes.partial-1", ".old.partial-2/notes")]

@@ -115,23 +115,16 @@ def test_file_is_found_from_the_folder_of_the_scene(capsys, rough):
     assert call(capsys, "plan", "scenes/my.toml")[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (("nowhere.npy",), "there is no such file"),
-        (
-            ("maps/my.npy",),
-            "allowed: --lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit",
-        ),
-        (("maps/my.npy", *LENGTHS, "--force", "2 mm"), "load.force = '2 mm'"),
-        (("maps/my.npy", *LENGTHS, "--poisson-ratio", "0.7"), "block.poisson_ratio = 0.7"),
-        (("maps/my.npy", *LENGTHS, "--height-unit", "parsec"), "is no unit of heights"),
-        (("maps/my.npy", *LENGTHS, "--channel", "3"), "which have one channel only"),
-        (("maps/my.npy", "--force", "1 N", "--approach", "1 um"), "not allowed with argument"),
-        (("scene.toml",), "is a scene, not a surface"),
-        (("--out", "x" * 300), "cannot be written"),
-    ],
-)
+@pytest.mark.parametrize(("words", "text"), [
+    (("nowhere.npy",), "there is no such file"),
+    (("maps/my.npy",), "allowed: --lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit"),
+    (("maps/my.npy", *LENGTHS, "--force", "2 mm"), "load.force = '2 mm'"),
+    (("maps/my.npy", *LENGTHS, "--poisson-ratio", "0.7"), "block.poisson_ratio = 0.7"),
+    (("maps/my.npy", *LENGTHS, "--height-unit", "parsec"), "is no unit of heights"),
+    (("maps/my.npy", *LENGTHS, "--channel", "3"), "which have one channel only"),
+    (("maps/my.npy", "--force", "1 N", "--approach", "1 um"), "not allowed with argument"),
+    (("scene.toml",), "is a scene, not a surface"), (("--out", "x" * 300), "cannot be written"),
+])  # fmt: skip
 def test_wrong_words_write_nothing(capsys, rough, words, text):
     code, shown, err = call(capsys, "init", *words)
     assert (code, shown) == (5 if "written" in text else 2, "")

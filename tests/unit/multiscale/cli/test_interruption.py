@@ -50,15 +50,10 @@ def disturb(monkeypatch, change):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "code", "text"),
-    [
-        (signal.SIGINT, 130, "interrupted (SIGINT)"),
-        (signal.SIGTERM, 143, "terminated (SIGTERM)"),
-        (signal.SIGHUP, 129, "hung up (SIGHUP)"),
-        (signal.SIGUSR1, 4, "told to stop (SIGUSR1)"),
-    ],
-)
+@pytest.mark.parametrize(("number", "code", "text"), [
+    (signal.SIGINT, 130, "interrupted (SIGINT)"), (signal.SIGTERM, 143, "terminated (SIGTERM)"),
+    (signal.SIGHUP, 129, "hung up (SIGHUP)"), (signal.SIGUSR1, 4, "told to stop (SIGUSR1)"),
+])  # fmt: skip
 def test_signal_stops_after_the_load_step(
     capfd, tmp_path, monkeypatch, undisturbed, number, code, text
 ):
@@ -118,16 +113,11 @@ def test_durations(text, seconds):
     assert parse_duration(text) == pytest.approx(seconds, rel=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("90", 'has no unit .*such as "55 min"'),
-        ("5 mm", "has the wrong unit"),
-        ("soon", "cannot be read as a quantity"),
-        ("0 s", "must be greater than 0"),
-        ("-5 min", "must be greater than 0"),
-    ],
-)
+@pytest.mark.parametrize(("text", "problem"), [
+    ("90", 'has no unit .*such as "55 min"'), ("5 mm", "has the wrong unit"),
+    ("soon", "cannot be read as a quantity"), ("0 s", "must be greater than 0"),
+    ("-5 min", "must be greater than 0"),
+])  # fmt: skip
 def test_what_is_no_duration(capsys, text, problem):
     with pytest.raises(ValueError, match=problem):
         parse_duration(text)
@@ -228,13 +218,7 @@ sys.exit(command_line.main(["schema"]))
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "module",
-    [
-        "dolfinx.cpp", "petsc4py.PETSc",
-        *(pytest.param(name, marks=pytest.mark.long) for name in ("basix._basixcpp", "cffi.api")),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("module", ["dolfinx.cpp", "petsc4py.PETSc"])
 def test_a_signal_while_finite_elements_are_imported_ends_with_its_code(root, module):
     """Compiled modules turn what interrupts their import into an ImportError of their own."""
     done = subprocess.run(

@@ -59,15 +59,6 @@ def test_the_same_scene_is_run_again(scene, capsys):
     assert (scene.parent / "results" / "scene" / "report.html").is_file()
 
 
-def test_only_the_first_keys_are_named(scene, capsys):
-    assert main(["run", "scene.toml"]) == 0
-    changes = ("patches.grid=[3, 3]", "load.steps=3", "surface.spectrum.seed=4")
-    assert main(["run", "scene.toml", "--out", "results/scene", "--set", STIFFER, *changes]) == 2
-    assert "block.young_modulus was 4000.0" in (error := capsys.readouterr().err)
-    assert error.count(" was ") == 3
-    assert "and 1 more" in error
-
-
 def test_what_an_earlier_version_did_not_know_is_no_difference(scene):
     assert main(["run", "scene.toml"]) == 0
     path = scene.parent / "results" / "scene" / "provenance.json"

@@ -26,14 +26,9 @@ def shell_line(words):
 def shell(root, words, redirection, encoding="utf-8", **environment):
     """Run the command from a shell, which closes and redirects streams."""
     return subprocess.run(
-        f"{shell_line(words)} {redirection}",
-        shell=True,
-        cwd=root,
-        env=os.environ | environment,
-        capture_output=True,
-        encoding=encoding,
-        check=False,
-    )
+        f"{shell_line(words)} {redirection}", shell=True, cwd=root, env=os.environ | environment,
+        capture_output=True, encoding=encoding, check=False,
+    )  # fmt: skip
 
 
 @pytest.mark.long
@@ -89,12 +84,9 @@ def test_interrupt_during_imports_is_quiet(root, seconds):
     )
     for _ in range(3):  # the interpreter loses a signal that comes while C code asks for attributes
         done = subprocess.run(
-            [sys.executable, "-c", code, "plan", PAPER],
-            cwd=root,
-            capture_output=True,
-            text=True,
+            [sys.executable, "-c", code, "plan", PAPER], cwd=root, capture_output=True, text=True,
             check=False,
-        )
+        )  # fmt: skip
         assert "Traceback" not in done.stderr
         if done.returncode != 0:
             break

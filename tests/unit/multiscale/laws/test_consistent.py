@@ -34,15 +34,10 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
     return model, patches, means, table, PatchContact(table, half_space)
 
 
-@pytest.mark.parametrize(
-    ("grid", "name"),
-    [
-        ((1, 1), "circular"),
-        pytest.param((3, 2), "half-space", marks=pytest.mark.long),
-        ((3, 2), "circular"),
-        ((8, 8), "circular"),
-    ],
-)
+@pytest.mark.parametrize(("grid", "name"), [
+    ((1, 1), "circular"), pytest.param((3, 2), "half-space", marks=pytest.mark.long),
+    ((3, 2), "circular"), ((8, 8), "circular"),
+])  # fmt: skip
 def test_whole_surface_comes_back(surface, grid, name):
     model, patches, means, table, coupling = parts(surface, grid, name, 1e-3)
     law = max(table.laws, key=lambda one: len(one.rows))
@@ -77,15 +72,11 @@ def test_tables_keep_their_tolerance_and_say_so(surface):
     assert (table.made_by["coupling"], table.made_by["tilt"]) == ("consistent", "0, 0")
 
 
-@pytest.mark.parametrize(
-    ("macro", "tilt"),
-    [
-        *(("half-space", tilt) for tilt in ((0.0, 0.0), (5e-3, -2e-3))),
-        pytest.param("half-space", None, marks=pytest.mark.long),
-        ("too stiff", (5e-3, -2e-3)),
-        ("made up", None),
-    ],
-)
+@pytest.mark.parametrize(("macro", "tilt"), [
+    *(("half-space", tilt) for tilt in ((0.0, 0.0), (5e-3, -2e-3))),
+    pytest.param("half-space", None, marks=pytest.mark.long), ("too stiff", (5e-3, -2e-3)),
+    ("made up", None),
+])  # fmt: skip
 def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
     """Closures count in the compliance of the model that the laws are for, right or wrong."""
     model = micro_model("circular", surface, contact_modulus=MODULUS)
@@ -98,13 +89,9 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         random = np.random.default_rng(2).normal(size=compliance.shape)
         compliance = compliance + 0.02 * compliance.max() * random @ random.T
     table = consistent_laws(
-        model,
-        patches,
-        mean_heights=means,
-        largest=Control(force=2.0, tilt=tilt),
-        displacements=lambda pressures: pressures @ compliance.T,
-        tolerance=1e-3,
-    )
+        model, patches, mean_heights=means, largest=Control(force=2.0, tilt=tilt),
+        displacements=lambda pressures: pressures @ compliance.T, tolerance=1e-3,
+    )  # fmt: skip
     coupling, start = PatchContact(table, compliance), None
     if tilt is None:
         coupling = FreePlaneContact(table, lambda pressures: pressures @ compliance.T)
@@ -138,12 +125,9 @@ def test_rows_where_a_patch_falls_behind_are_left_out(surface):
     model = micro_model("circular", surface, contact_modulus=MODULUS)
     patches = PatchGrid(grid=(2, 1), lengths=surface.lengths)
     whole = WholeSurface(
-        model=model,
-        patches=patches,
-        mean_heights=patch_means(surface, patches),
-        displacements=lambda pressures: 0.0 * pressures,
-        tilt=None,
-    )
+        model=model, patches=patches, mean_heights=patch_means(surface, patches),
+        displacements=lambda pressures: 0.0 * pressures, tilt=None,
+    )  # fmt: skip
     approaches = np.linspace(0.1, 0.9, 6) * END
     rows = whole.rows(approaches)
     approach, closure = rows.approach.copy(), rows.closure.copy()

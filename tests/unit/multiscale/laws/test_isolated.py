@@ -133,12 +133,9 @@ def test_law_that_is_nowhere_a_function_goes_on_over_the_approach(surface):
 def test_all_laws_of_a_grid(surface, model):
     patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
     table = isolated_laws(
-        model,
-        patches,
-        mean_heights=patch_means(surface, patches),
-        closure_ends=np.full(6, 10e-3),
+        model, patches, mean_heights=patch_means(surface, patches), closure_ends=np.full(6, 10e-3),
         love="centre",
-    )
+    )  # fmt: skip
     assert table.made_by["love"] == "centre"
     owner = patches.index_of(model.asperities.x, model.asperities.y)
     for index, law in enumerate(table.laws):

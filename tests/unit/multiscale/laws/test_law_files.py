@@ -27,33 +27,23 @@ def table():
         rising = np.sort(random.random((5, rows)), axis=1)
         rising[1, :1] = 0.0
         columns = LawRows(
-            closure=rising[0],
-            pressure=rising[1],
-            approach=rising[2],
-            contact_area_fraction=rising[3],
-            contacts=np.arange(rows),
+            closure=rising[0], pressure=rising[1], approach=rising[2],
+            contact_area_fraction=rising[3], contacts=np.arange(rows),
             unresolved_displacement=rising[4],
-        )
+        )  # fmt: skip
         return PatchLaw(
-            rows=columns,
-            first_touch=rising[0, 0] if rows else np.inf,
-            initial_separation=random.random(),
-            interpolation_error=1 / 3,
-            stiffness_error=1 / 7,
+            rows=columns, first_touch=rising[0, 0] if rows else np.inf,
+            initial_separation=random.random(), interpolation_error=1 / 3, stiffness_error=1 / 7,
             warning_pressure=1 / 11,
             transmissivity=Transmissivity(
-                separation=rising[4] + np.arange(rows),
-                hydraulic_gap=random.random((rows, 2)),
-                on_half=random.random((rows, 2)),
-                scatter=random.random((rows, 2)),
-            )
-            if rows > 2
-            else None,
+                separation=rising[4] + np.arange(rows), hydraulic_gap=random.random((rows, 2)),
+                on_half=random.random((rows, 2)), scatter=random.random((rows, 2)),
+            ) if rows > 2 else None,
             untouched=Untouched(
                 closure=-np.sort(random.random(rows // 2))[::-1],
                 unresolved_displacement=random.random(rows // 2),
             ),
-        )
+        )  # fmt: skip
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
     laws = tuple(law(rows) for rows in (7, 0, 2, 3, 4, 5))
@@ -112,35 +102,20 @@ def test_other_files_are_refused(tmp_path):
         read_laws(path)
 
 
-def test_files_of_an_earlier_format_are_refused(table, tmp_path):
-    """Their closures were taken with another compliance."""
+@pytest.mark.parametrize(("what", "problem"), [
+    (lambda file: file.attrs.modify("format", "patchlaw laws 2"), "is not a law file of patchlaw"),
+    (lambda file: file.pop("patch_1_2/pressure"), "is not a readable law file: .*pressure"),
+    (lambda file: file["patch_0_0/closure"].write_direct(np.full(7, np.nan)),
+     "needs a finite closure"),
+], ids=["earlier format", "missing column", "damaged law"])  # fmt: skip
+def test_changed_files_are_refused(table, tmp_path, what, problem):
+    """Closures of an earlier format were taken with another compliance."""
     path = tmp_path / "laws.h5"
     write_laws(path, table)
-    change(path, lambda file: file.attrs.modify("format", "patchlaw laws 2"))
-    with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
-        read_laws(path)
-
-
-def change(path, what):
-    """Change the content of a law file, with a checksum that fits."""
     with h5py.File(path, "r+") as file:
         what(file)
     path.write_bytes(checksum_hdf5(path.read_bytes()))
-
-
-def test_missing_column_is_refused(table, tmp_path):
-    path = tmp_path / "laws.h5"
-    write_laws(path, table)
-    change(path, lambda file: file.pop("patch_1_2/pressure"))
-    with pytest.raises(InputError, match=r"is not a readable law file: .*pressure"):
-        read_laws(path)
-
-
-def test_damaged_law_is_refused(table, tmp_path):
-    path = tmp_path / "laws.h5"
-    write_laws(path, table)
-    change(path, lambda file: file["patch_0_0/closure"].write_direct(np.full(7, np.nan)))
-    with pytest.raises(InputError, match=r"laws.h5: .*needs a finite closure"):
+    with pytest.raises(InputError, match=rf"laws.h5: .*{problem}"):
         read_laws(path)
 
 

@@ -12,13 +12,10 @@ from patchlaw.support import InputError
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):
     closure = np.linspace(touch, end, rows)
     columns = {
-        "closure": closure,
-        "pressure": form(closure - touch),
-        "approach": closure,
-        "contact_area_fraction": 3.0 * (closure - touch),
-        "contacts": np.arange(rows),
+        "closure": closure, "pressure": form(closure - touch), "approach": closure,
+        "contact_area_fraction": 3.0 * (closure - touch), "contacts": np.arange(rows),
         "unresolved_displacement": 0.5 * (closure - touch),
-    }
+    }  # fmt: skip
     made = LawRows(**(columns | changes))
     return PatchLaw(rows=made, first_touch=touch, initial_separation=0.02)
 
@@ -88,19 +85,14 @@ def test_area_and_separation():
     np.testing.assert_allclose(found.separation, [0.02, 0.0175], rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"closure": np.linspace(1e-3, 9e-3, 11)}, "a patch law needs columns of one length"),
-        (
-            {"approach": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
-            "a patch law needs a strictly increasing approach",
-        ),
-        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "a patch law needs a finite pressure"),
-        ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "needs a pressure without tension"),
-        ({"pressure": np.linspace(1, 2, 12)}, "a patch law starts at zero pressure"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "text"), [
+    ({"closure": np.linspace(1e-3, 9e-3, 11)}, "a patch law needs columns of one length"),
+    ({"approach": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
+     "a patch law needs a strictly increasing approach"),
+    ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "a patch law needs a finite pressure"),
+    ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "needs a pressure without tension"),
+    ({"pressure": np.linspace(1, 2, 12)}, "a patch law starts at zero pressure"),
+])  # fmt: skip
 def test_impossible_tables_are_refused(changes, text):
     with pytest.raises(InputError, match=text):
         law_of(hertz, **changes)

@@ -16,13 +16,10 @@ def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):
     approach = np.linspace(touch, 9e-3, rows)
     pressure = stiffness * (approach - touch) ** 1.5
     columns = LawRows(
-        closure=approach - own * pressure,
-        pressure=pressure,
-        approach=approach,
-        contact_area_fraction=3.0 * (approach - touch),
-        contacts=np.arange(rows),
+        closure=approach - own * pressure, pressure=pressure, approach=approach,
+        contact_area_fraction=3.0 * (approach - touch), contacts=np.arange(rows),
         unresolved_displacement=0.5 * (approach - touch),
-    )
+    )  # fmt: skip
     return PatchLaw(rows=columns, first_touch=touch, initial_separation=0.02)
 
 

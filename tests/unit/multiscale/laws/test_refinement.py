@@ -23,14 +23,10 @@ def rows_of(approach, pressure):
     """Rows of two patches on the half-space of the compliance."""
     local, nothing = np.column_stack((approach, approach)), np.zeros((len(approach), 2))
     return LawRows(
-        approach=local,
-        closure=local - pressure @ COMPLIANCE,
-        pressure=pressure,
-        contact_area_fraction=nothing,
-        contacts=nothing.astype(int),
-        unresolved_displacement=nothing,
-        outside_range=nothing > 0.0,
-    )
+        approach=local, closure=local - pressure @ COMPLIANCE, pressure=pressure,
+        contact_area_fraction=nothing, contacts=nothing.astype(int),
+        unresolved_displacement=nothing, outside_range=nothing > 0.0,
+    )  # fmt: skip
 
 
 class Solver:
@@ -159,18 +155,12 @@ def test_nothing_to_refine_without_contact():
 @pytest.mark.parametrize(("tolerance", "missed"), [(1e-9, True), (1e-2, False)])
 def test_tolerance_that_is_missed_is_said(tolerance, missed):
     spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1}
-    run = Run(
-        Scene.from_dict(
-            {
-                "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
-                "block": {"young_modulus": 4000.0, "poisson_ratio": 0.3, "cells": [4, 4, 4]},
-                "patches": {"grid": [2, 2]},
-                "micro": {"model": "circular-independent"},
-                "coupling": {"table_tolerance": tolerance},
-                "load": {"approach": 0.01, "steps": 1},
-            }
-        )
-    )
+    run = Run(Scene.from_dict({
+        "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.3, "cells": [4, 4, 4]},
+        "patches": {"grid": [2, 2]}, "micro": {"model": "circular-independent"},
+        "coupling": {"table_tolerance": tolerance}, "load": {"approach": 0.01, "steps": 1},
+    }))  # fmt: skip
     run.make_laws()
     said = [
         note for note in run.history().notes if "the laws miss coupling.table_tolerance" in note

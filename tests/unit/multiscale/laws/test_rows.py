@@ -19,13 +19,9 @@ def rows(pressure):
     """Rows of a patch alone, its closure less than the approach by its own displacement."""
     pressure, nothing = np.asarray(pressure, float), np.zeros(len(pressure))
     return LawRows(
-        approach=APPROACH,
-        closure=APPROACH - COMPLIANCE * pressure,
-        pressure=pressure,
-        contact_area_fraction=nothing,
-        contacts=np.arange(9),
-        unresolved_displacement=nothing,
-    )
+        approach=APPROACH, closure=APPROACH - COMPLIANCE * pressure, pressure=pressure,
+        contact_area_fraction=nothing, contacts=np.arange(9), unresolved_displacement=nothing,
+    )  # fmt: skip
 
 
 def noisy(seed=3):

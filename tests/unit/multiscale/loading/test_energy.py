@@ -14,32 +14,20 @@ YOUNG = 4000.0
 def through_full_contact(steps, largest):
     """Return a run whose mean pressure rises to a share of Young's modulus."""
     spectrum = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.2, "seed": 3}
-    return run(
-        Scene.from_dict(
-            {
-                "surface": {
-                    "spectrum": spectrum,
-                    "grid": [40, 40],
-                    "lengths": [0.02, 0.02],
-                    "periodic": True,
-                },
-                "block": {"young_modulus": YOUNG, "poisson_ratio": 0.3},
-                "coupling": {"kind": "analytic"},
-                "load": {"pressure": largest * YOUNG, "steps": steps},
-                "output": {"figures": False, "report": False, "check": "none"},
-            }
-        )
-    )
+    return run(Scene.from_dict({
+        "surface": {
+            "spectrum": spectrum, "grid": [40, 40], "lengths": [0.02, 0.02], "periodic": True,
+        },
+        "block": {"young_modulus": YOUNG, "poisson_ratio": 0.3}, "coupling": {"kind": "analytic"},
+        "load": {"pressure": largest * YOUNG, "steps": steps},
+        "output": {"figures": False, "report": False, "check": "none"},
+    }))  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("steps", "largest"),
-    [
-        (6, 0.24),
-        pytest.param(8, 0.75, marks=pytest.mark.long),
-        pytest.param(10, 0.24, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.parametrize(("steps", "largest"), [
+    (6, 0.24), pytest.param(8, 0.75, marks=pytest.mark.long),
+    pytest.param(10, 0.24, marks=pytest.mark.long),
+])  # fmt: skip
 def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
     """The stiffness grows without bound there; the trapezoidal rule errs by up to 0.6 %."""
     history = through_full_contact(steps, largest)

@@ -10,18 +10,13 @@ from patchlaw.multiscale.loading.path import Path, Stage
 from patchlaw.support import InputError
 
 
-@pytest.mark.parametrize(
-    ("load", "words"),
-    [
-        ({}, "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
-        (
-            {"force": (1.0,), "cycles": 2, "shear": ((1.0, 0.0), (0.0, 0.0))},
-            "cycles = 2 needs two turning points",
-        ),
-        ({"force": (1.0,), "steps": 0}, "steps = 0: must be greater than or equal to 1"),
-        ({"force": (1.0,), "zero": "sea"}, "zero: is no height that approaches count from"),
-    ],
-)
+@pytest.mark.parametrize(("load", "words"), [
+    ({}, "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
+    ({"force": (1.0,), "cycles": 2, "shear": ((1.0, 0.0), (0.0, 0.0))},
+     "cycles = 2 needs two turning points"),
+    ({"force": (1.0,), "steps": 0}, "steps = 0: must be greater than or equal to 1"),
+    ({"force": (1.0,), "zero": "sea"}, "zero: is no height that approaches count from"),
+])  # fmt: skip
 def test_loads_that_make_no_sense_are_refused(load, words):
     with pytest.raises(InputError, match=re.escape(words)):
         LoadHistory(**load)

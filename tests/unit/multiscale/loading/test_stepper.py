@@ -30,19 +30,11 @@ class Spring:
         self.last = approach
         one = np.ones(1)
         return LoadStep(
-            step=0,
-            approach_mm=approach,
-            force_N=approach**1.5,
-            mean_pressure_MPa=0.0,
-            contact_area_fraction=0.0,
-            mean_separation_mm=0.0,
-            contacts=0,
-            newton_iterations=3,
-            linear_iterations=10,
-            wall_s=0.0,
-            reason="CONVERGED",
+            step=0, approach_mm=approach, force_N=approach**1.5, mean_pressure_MPa=0.0,
+            contact_area_fraction=0.0, mean_separation_mm=0.0, contacts=0, newton_iterations=3,
+            linear_iterations=10, wall_s=0.0, reason="CONVERGED",
             patches=PatchState(closure_mm=one, pressure_MPa=one, contact_area_fraction=one),
-        )
+        )  # fmt: skip
 
 
 def test_a_load_that_a_solver_refuses_is_wrong_input_before_the_first_step_alone():

@@ -133,17 +133,11 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     np.testing.assert_allclose(fields[1], fields[0], atol=1e-8 * np.abs(fields[0]).max())
 
 
-@pytest.mark.parametrize(
-    ("overrides", "condensed"),
-    [
-        ([], True),
-        (["block.element=P1"], True),
-        (["block.element=P1", *MANY], False),
-        (MANY, True),
-        (["coupling.interface=pointwise"], False),
-        (["friction.coefficient=0.3", "load.shear=[0.001, 0]"], False),
-    ],
-)
+@pytest.mark.parametrize(("overrides", "condensed"), [
+    ([], True), (["block.element=P1"], True), (["block.element=P1", *MANY], False), (MANY, True),
+    (["coupling.interface=pointwise"], False),
+    (["friction.coefficient=0.3", "load.shear=[0.001, 0]"], False),
+])  # fmt: skip
 def test_laws_are_condensed_unless_the_mesh_is_needed(overrides, condensed):
     """Where more happens than mean pressures, or more patches than laws have rows want a mesh."""
     assert make_setup(scene(*overrides)).condensed == condensed

@@ -16,13 +16,10 @@ PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 def law(end=1.0, **columns):
     closure = np.linspace(0.0, end, 11)
     rows = {
-        "closure": closure,
-        "pressure": closure**1.5,
-        "approach": closure,
-        "contact_area_fraction": 0.1 * closure,
-        "contacts": np.arange(11),
+        "closure": closure, "pressure": closure**1.5, "approach": closure,
+        "contact_area_fraction": 0.1 * closure, "contacts": np.arange(11),
         "unresolved_displacement": 0.01 * closure,
-    }
+    }  # fmt: skip
     return PatchLaw(rows=LawRows(**(rows | columns)), first_touch=0.0, initial_separation=2.0)
 
 
@@ -37,20 +34,12 @@ class EasyBlock:
     def solve(self, control):
         self.approach = approach = control.approach
         return SimpleNamespace(
-            approach=approach,
-            tilt=control.tilt,
-            moment=np.array([-0.0625, 0.0]) * approach**1.5,
-            patch_closure=np.full(2, approach),
-            patch_pressure=np.array([1.5, 0.5]) * approach**1.5,
-            force=0.5 * approach**1.5,
-            reaction=0.5 * approach**1.5 * (1 - 1e-11),
-            displacement=np.array([approach]),
-            iterations=3,
-            linear_iterations=10,
-            residuals=np.array([1.0, 1e-11]),
-            reason="CONVERGED_FNORM_RELATIVE",
-            shear=None,
-        )
+            approach=approach, tilt=control.tilt, moment=np.array([-0.0625, 0.0]) * approach**1.5,
+            patch_closure=np.full(2, approach), patch_pressure=np.array([1.5, 0.5]) * approach**1.5,
+            force=0.5 * approach**1.5, reaction=0.5 * approach**1.5 * (1 - 1e-11),
+            displacement=np.array([approach]), iterations=3, linear_iterations=10,
+            residuals=np.array([1.0, 1e-11]), reason="CONVERGED_FNORM_RELATIVE", shear=None,
+        )  # fmt: skip
 
     def patch_means(self, function):
         return function(np.arange(2), np.full(2, self.approach))

@@ -126,12 +126,6 @@ def test_datasets_have_named_dimensions(cycle, monkeypatch):
     assert {"pressure_MPa", "gap_mm", "plastic_depth_mm", "spot_force_N"} <= set(made.values)
 
 
-def test_datasets_without_xarray_say_what_to_install(cycle, monkeypatch):
-    monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(ImportError, match=r"needs xarray .*plain arrays without it"):
-        read_contact(cycle[1]).to_xarray()
-
-
 def test_datasets_are_those_of_xarray(cycle):
     pytest.importorskip("xarray")
     made, found = read_contact(cycle[1]).to_xarray(), read_contact(cycle[1])

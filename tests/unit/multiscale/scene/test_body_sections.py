@@ -58,14 +58,10 @@ def test_regions_have_hardness_and_friction_of_their_own_or_those_of_the_face():
 
 
 @pytest.mark.parametrize("whole", [False, True])
-@pytest.mark.parametrize(
-    "sections",
-    [
-        {"counter_body": STEEL, "counter_surface": SURFACE},
-        {"body": BODY, "counter_body": BODY},
-        {"body": BODY, "law": {"kind": "representative", "seeds": [1]}},
-    ],
-)
+@pytest.mark.parametrize("sections", [
+    {"counter_body": STEEL, "counter_surface": SURFACE}, {"body": BODY, "counter_body": BODY},
+    {"body": BODY, "law": {"kind": "representative", "seeds": [1]}},
+])  # fmt: skip
 def test_scenes_are_read_back_as_they_are_written(sections, whole):
     given = scene(**sections)
     dumped = given.to_dict(whole=whole)

@@ -11,16 +11,12 @@ from patchlaw.support import InputError
 
 
 def scene(heights, **surface):
-    return Scene.from_dict(
-        {
-            "surface": {"heights": heights, "lengths": ["1 mm", "0.5 mm"], **surface},
-            "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3},
-            "micro": {"model": "half-space"},
-            "coupling": {"kind": "analytic"},
-            "load": {"approach": "2 um", "steps": 2},
-            "output": {"check": "none"},
-        }
-    )
+    return Scene.from_dict({
+        "surface": {"heights": heights, "lengths": ["1 mm", "0.5 mm"], **surface},
+        "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3}, "micro": {"model": "half-space"},
+        "coupling": {"kind": "analytic"}, "load": {"approach": "2 um", "steps": 2},
+        "output": {"check": "none"},
+    })  # fmt: skip
 
 
 @pytest.fixture
@@ -84,14 +80,11 @@ def test_scenes_are_equal_when_their_heights_are(heights):
     assert text != json.dumps(scene(heights + 1e-6).to_dict())
 
 
-@pytest.mark.parametrize(
-    ("value", "problem"),
-    [
-        ([1.0, 2.0], "surface.heights.*is no map of heights"),
-        ([["a", "b"]], "surface.heights.*not an array of real numbers"),
-        (np.zeros((2, 2, 2)), "is no map of heights"),
-    ],
-)
+@pytest.mark.parametrize(("value", "problem"), [
+    ([1.0, 2.0], "surface.heights.*is no map of heights"),
+    ([["a", "b"]], "surface.heights.*not an array of real numbers"),
+    (np.zeros((2, 2, 2)), "is no map of heights"),
+])  # fmt: skip
 def test_what_is_no_map_is_refused(value, problem):
     with pytest.raises(InputError, match=problem):
         scene(value)

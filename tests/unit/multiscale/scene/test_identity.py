@@ -18,13 +18,9 @@ BODY = {
 RIM = {"surface": "rim", **SURFACE, "file": "rim.npy"}
 LAW = {"kind": "representative", "samples": ["second.npy"], "regions": [RIM]}
 DATA = {
-    "surface": SURFACE,
-    "counter_surface": {**SURFACE, "file": "other.npy"},
-    "body": BODY,
-    "counter_body": {**BODY, "mesh": "plate.xdmf"},
-    "law": LAW,
-    "load": {"force": 1.0},
-}
+    "surface": SURFACE, "counter_surface": {**SURFACE, "file": "other.npy"}, "body": BODY,
+    "counter_body": {**BODY, "mesh": "plate.xdmf"}, "law": LAW, "load": {"force": 1.0},
+}  # fmt: skip
 KEYS = {
     "surface.file": "scan.npy", "counter_surface.file": "other.npy", "body.mesh": "part.msh",
     "counter_body.mesh": "plate.xdmf", "law.regions.0.file": "rim.npy",

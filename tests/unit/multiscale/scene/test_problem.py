@@ -53,14 +53,11 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
 
 
-@pytest.mark.parametrize(
-    ("tilt", "coupling", "load"),
-    [
-        ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
-        ("free", "under the tilt that the plane takes at each approach;", "the plane free to tilt"),
-        ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
-    ],
-)
+@pytest.mark.parametrize(("tilt", "coupling", "load"), [
+    ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
+    ("free", "under the tilt that the plane takes at each approach;", "the plane free to tilt"),
+    ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
+])  # fmt: skip
 def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
     said = dict(make_setup(scene(approach=8e-3, tilt=tilt)).about.statements())
     assert coupling in said["coupling"]
@@ -82,16 +79,10 @@ def test_the_plan_warns_of_flat_summits_that_carry_nothing(tmp_path, model, warn
     np.save(tmp_path / "steps.npy", steps)
     surface = {"file": str(tmp_path / "steps.npy"), "lengths": ["1 mm", "1 mm"]}
     block = {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [8, 8, 6]}
-    stepped = Scene.from_dict(
-        {
-            "surface": surface,
-            "block": block,
-            "patches": {"grid": [2, 2]},
-            "micro": {"model": model},
-            "coupling": {"kind": "isolated"},
-            "load": {"approach": "4 um", "steps": 1},
-        }
-    )
+    stepped = Scene.from_dict({
+        "surface": surface, "block": block, "patches": {"grid": [2, 2]}, "micro": {"model": model},
+        "coupling": {"kind": "isolated"}, "load": {"approach": "4 um", "steps": 1},
+    })  # fmt: skip
     said = [text for text in make_setup(stepped).about.warnings() if "summits are flat" in text]
     assert len(said) == warns
 
@@ -127,16 +118,11 @@ def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
 @pytest.mark.parametrize(("given", "height"), [({}, 20), ({"height": "5 um"}, 5)])
 def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
     spectrum = {"hurst": 0.95, "waves": [2, 4], "rms_slope": 0.2, "seed": 1}
-    made = make_setup(
-        Scene.from_dict(
-            {
-                "surface": {"spectrum": spectrum, "grid": [32, 16], "lengths": ["40 um", "20 um"]},
-                "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, **given},
-                "micro": {"model": "half-space"},
-                "load": {"approach": "0.1 um"},
-            }
-        )
-    )
+    made = make_setup(Scene.from_dict({
+        "surface": {"spectrum": spectrum, "grid": [32, 16], "lengths": ["40 um", "20 um"]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, **given},
+        "micro": {"model": "half-space"}, "load": {"approach": "0.1 um"},
+    }))  # fmt: skip
     assert made.parts.body.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
     said = dict(made.about.statements())["block"]
     assert f"40 µm × 20 µm and {height} µm high, free sides" in said

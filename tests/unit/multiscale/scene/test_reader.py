@@ -59,12 +59,9 @@ def test_quantities_and_records_within_records_are_read():
     data = {"radius": "1 mm", "bores": [{"radius": 2}], "loads": "3 kN"}
     plate = read(Plate, data | {"named": {"a": {"radius": "4 um"}}, "sides": ["1 m", 0.5]})
     assert plate == Plate(
-        radius=1.0,
-        bores=(Bore(radius=2.0),),
-        named={"a": Bore(radius=4e-3)},
-        sides=(1000.0, 0.5),
+        radius=1.0, bores=(Bore(radius=2.0),), named={"a": Bore(radius=4e-3)}, sides=(1000.0, 0.5),
         loads=(3000.0,),
-    )
+    )  # fmt: skip
     assert read(Plate, to_dict(plate)) == plate == read(Plate, to_dict(plate, whole=False))
     assert "inner" not in to_dict(plate) and "sides" not in to_dict(Plate(radius=1.0), whole=False)
 

@@ -15,16 +15,11 @@ from patchlaw.support import InputError
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
 
-@pytest.mark.parametrize(
-    ("overrides", "decomposed"),
-    [
-        (["kind=isolated"], False),
-        (["kind=consistent"], True),
-        (["kind=consistent", "interface=pointwise"], False),
-        (["kind=concurrent"], True),
-        (["kind=analytic"], False),
-    ],
-)
+@pytest.mark.parametrize(("overrides", "decomposed"), [
+    (["kind=isolated"], False), (["kind=consistent"], True),
+    (["kind=consistent", "interface=pointwise"], False), (["kind=concurrent"], True),
+    (["kind=analytic"], False),
+])  # fmt: skip
 def test_which_block_stands_under_the_patches(overrides, decomposed):
     scene = Scene.load(PAPER, [f"coupling.{text}" for text in overrides])
     assert scene.decomposed == decomposed

@@ -18,14 +18,10 @@ PERIODIC = ["surface.periodic=true", "coupling.kind=analytic", "micro.model=half
 def test_a_map_is_prepared_as_the_scene_says(tmp_path):
     np.save(tmp_path / "scan.npy", 10.0 * np.random.default_rng(1).random((40, 40)))
     section = {
-        "file": str(tmp_path / "scan.npy"),
-        "lengths": ["1 mm", "1 mm"],
-        "height_unit": "um",
-        "crop": {"x": ["0.1 mm", "0.9 mm"]},
-        "detrend": "plane",
-        "filter": {"short": "100 um", "long": "500 um"},
-        "resample": [16, 20],
-    }
+        "file": str(tmp_path / "scan.npy"), "lengths": ["1 mm", "1 mm"], "height_unit": "um",
+        "crop": {"x": ["0.1 mm", "0.9 mm"]}, "detrend": "plane",
+        "filter": {"short": "100 um", "long": "500 um"}, "resample": [16, 20],
+    }  # fmt: skip
     block = {"young_modulus": "4 GPa", "poisson_ratio": 0.3}
     rest = {"block": block, "patches": {"grid": [2, 2]}, "load": {"approach": "1 um"}}
     surface = make_setup(Scene.from_dict({"surface": section, **rest})).parts.surface

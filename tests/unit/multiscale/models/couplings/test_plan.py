@@ -10,20 +10,14 @@ from patchlaw.support.readable import Caution
 def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
     """Return the setup of a scene that states as little as it can."""
     size = min(lengths)
-    return make_setup(
-        Scene.from_dict(
-            {
-                "surface": {
-                    "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": f"{size} um"},
-                    "grid": [48, 48],
-                    "lengths": [f"{side} mm" for side in lengths],
-                },
-                "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3} | block,
-                "coupling": {"kind": kind},
-                "load": {"approach": f"{size} um"},
-            }
-        )
-    )
+    return make_setup(Scene.from_dict({
+        "surface": {
+            "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": f"{size} um"},
+            "grid": [48, 48], "lengths": [f"{side} mm" for side in lengths],
+        },
+        "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3} | block,
+        "coupling": {"kind": kind}, "load": {"approach": f"{size} um"},
+    }))  # fmt: skip
 
 
 def test_the_micro_model_is_half_space_when_not_given():
@@ -40,14 +34,11 @@ def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
     assert not list(setup.about.warnings())
 
 
-@pytest.mark.parametrize(
-    ("lengths", "block", "note"),
-    [
-        ((0.02, 0.02), {"height": "1 mm"}, "1 mm high and 0.02 mm wide, a ratio of 50: most of"),
-        ((4.0, 5.0), {"height": "1 mm"}, "1 mm high and 4 mm wide, a ratio of 4: the fixed bottom"),
-        ((5.0, 1.0), {}, "5 × 1 mm wide, a ratio of 5: are these the lengths along x and y"),
-    ],
-)
+@pytest.mark.parametrize(("lengths", "block", "note"), [
+    ((0.02, 0.02), {"height": "1 mm"}, "1 mm high and 0.02 mm wide, a ratio of 50: most of"),
+    ((4.0, 5.0), {"height": "1 mm"}, "1 mm high and 4 mm wide, a ratio of 4: the fixed bottom"),
+    ((5.0, 1.0), {}, "5 × 1 mm wide, a ratio of 5: are these the lengths along x and y"),
+])  # fmt: skip
 def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
     (said,) = setup_of(lengths, **block).about.warnings()
     assert note in said

@@ -11,17 +11,13 @@ from patchlaw.multiscale import LoadHistory, Run, Scene, make_setup
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
     spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
-    return Scene.from_dict(
-        {
-            "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
-            "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": list(cells)},
-            "micro": {"model": "half-space"},
-            "coupling": {"kind": kind},
-            "load": {"approach": 0.008, "steps": 4},
-            "output": {"figures": False, "report": False, "check": "none"},
-        }
-        | sections
-    )
+    return Scene.from_dict({
+        "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": list(cells)},
+        "micro": {"model": "half-space"}, "coupling": {"kind": kind},
+        "load": {"approach": 0.008, "steps": 4},
+        "output": {"figures": False, "report": False, "check": "none"},
+    } | sections)  # fmt: skip
 
 
 def test_steps_that_may_be_halved_are_counted():

@@ -75,15 +75,8 @@ def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     assert first.errors == () and np.isnan(history.force_error_N[0])
     causes = dict(last.errors)
     assert list(causes) == [
-        "mesh",
-        "quadrature",
-        "laws",
-        "samples",
-        "grid",
-        "slopes",
-        "edges",
-        "zero",
-    ]
+        "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", "zero",
+    ]  # fmt: skip
     assert all(error > 0.0 for error in causes.values())
     assert last.force_error_N == pytest.approx(sum(causes.values()), rel=1e-12)
     assert last.approach_error_mm == 0.0
@@ -117,15 +110,12 @@ def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     whole.close()
 
 
-@pytest.mark.slow
-def test_a_single_sample_tells_no_scatter(all_measured):
+def test_all_load_steps_are_measured_where_that_is_asked_for(all_measured):
+    """A single sample tells no scatter."""
+    assert np.isfinite(all_measured.force_error_N).sum() == 2
     assert "samples" not in dict(all_measured.steps[-1].errors)
     told = "top: the error is that for this one sample"
     assert any(told in note for note in all_measured.notes)
-
-
-def test_all_load_steps_are_measured_where_that_is_asked_for(all_measured):
-    assert np.isfinite(all_measured.force_error_N).sum() == 2
 
 
 @pytest.mark.long
@@ -137,16 +127,6 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
     assert step.force_error_N is None
     assert any("has no stated error, as that by mesh" in note for note in history.notes)
     assert any("quadratic elements, which would tell" in note for note in history.notes)
-
-
-@pytest.mark.slow
-def test_an_accuracy_is_said_not_to_be_kept(mesh):
-    stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
-    history = run(scene(mesh, accuracy=0.001, **stated))
-    step = history.steps[-1]
-    assert history.accuracy.kept is False
-    assert history.accuracy.error == pytest.approx(step.force_error_N / step.force_N, rel=1e-12)
-    assert "is not kept" in history.notes[0]
 
 
 @pytest.mark.long

@@ -264,13 +264,10 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
     shears = {"shear_force": [[14.0, 6.0]]} if by_force else {"shear": [[1e-3, 2e-4]]}
     load = load or loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
     data = {
-        "surface": surface,
-        "law": {"kind": "representative"} | dict(law),
-        "block": SLAB | {"cells": [3, 3, 2]},
-        "friction": {"coefficient": 0.3},
-        "load": load,
+        "surface": surface, "law": {"kind": "representative"} | dict(law),
+        "block": SLAB | {"cells": [3, 3, 2]}, "friction": {"coefficient": 0.3}, "load": load,
         "output": {"check": check, "figures": False, "report": False},
-    }
+    }  # fmt: skip
     return run(Scene.from_dict(data))
 
 

@@ -6,35 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.models.measured_errors import shear_of_samples
 from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
 
 
-def test_paths_on_cells_go_on_from_where_the_load_step_before_has_come(monkeypatch):
-    pressed = []
-
-    def gone(normal, friction, path, before):
-        pressed.extend(path)
-        return (before or "") + "".join(path)
-
-    monkeypatch.setattr(shear_of_samples, "gone", gone)
-    probe = SimpleNamespace(cells=SimpleNamespace(ends={}))
-    paths = "a", "ab", "ac", "acd", "ace", "xce", "xce"
-    ends = [LawShearProbe._gone(probe, "cells", None, None, list(path)) for path in paths]
-    assert ends == list(paths)
-    assert "".join(pressed) == "a" + "b" + "c" + "d" + "e" + "xce"
-
-
-@pytest.mark.parametrize(
-    ("before", "there", "error"),
-    [
-        (0.0, 5.0, 1.0),
-        (3.0, 4.2, 0.8),
-        (3.0, 7.0, 4.0),
-        (4.0, 4.0, 0.0),
-        (3.999996, 4.000004, 0.004),
-    ],
-)
+@pytest.mark.parametrize(("before", "there", "error"), [
+    (0.0, 5.0, 1.0), (3.0, 4.2, 0.8), (3.0, 7.0, 4.0), (4.0, 4.0, 0.0), (3.999996, 4.000004, 0.004),
+])  # fmt: skip
 def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, error):
     shear = SimpleNamespace(dissipated=4.0)
     probe = SimpleNamespace(

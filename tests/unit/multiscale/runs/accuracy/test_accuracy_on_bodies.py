@@ -156,14 +156,6 @@ def test_what_the_unknowns_do_not_reach_is_said_not_to_be_kept(plate, monkeypatc
 
 
 @pytest.mark.slow
-def test_elements_that_are_stated_stay(plate):
-    body = on_mesh(plate, element="linear", refinements=0)
-    setup = made(of_sample(accuracy=0.01, body=body))
-    assert setup.scene.body.element == "linear" and setup.scene.body.refinements == 0
-    assert not setup.scene.decision.kept and "is not kept" in setup.scene.decision.warning
-
-
-@pytest.mark.slow
 def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     steep = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.2}}
     load = {"pressure": 3.7, "steps": 1}

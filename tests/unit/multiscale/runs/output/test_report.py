@@ -60,13 +60,9 @@ def parsed(page):
 
 def report(text, **changes):
     history = SimpleNamespace(
-        table=lambda *names: ([text, text], [[text, text]]),
-        seconds={text: 1.0},
-        reference=None,
-        contact=None,
-        contact_records=(),
-        steps=[SimpleNamespace(step=2)],
-    )
+        table=lambda *names: ([text, text], [[text, text]]), seconds={text: 1.0}, reference=None,
+        contact=None, contact_records=(), steps=[SimpleNamespace(step=2)],
+    )  # fmt: skip
     step = SimpleNamespace(step=2, errors=((text, 0.25), (text, 0.5)), force_N=3.0)
     pair = (text, text)
     content = {

@@ -148,17 +148,11 @@ def test_pages_are_linked_and_need_no_network(contact, tmp_path, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("words", "match"),
-    [
-        (["--show", "mode"], "show = 'mode': is not known.*allowed: pressure, gap, plastic_depth"),
-        (["--step", "7"], "step = 7: is no load step whose contact was recorded.*allowed: 1, 2"),
-        (
-            ["--mode", "2"],
-            "mode = 2: has no effect.*where a natural mode is shown, of pressure, gap",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("words", "match"), [
+    (["--show", "mode"], "show = 'mode': is not known.*allowed: pressure, gap, plastic_depth"),
+    (["--step", "7"], "step = 7: is no load step whose contact was recorded.*allowed: 1, 2"),
+    (["--mode", "2"], "mode = 2: has no effect.*where a natural mode is shown, of pressure, gap"),
+])  # fmt: skip
 def test_what_results_lack_is_refused(contact, words, match, capsys):
     pytest.importorskip("pyvista")
     assert main(["view", str(contact), *words]) == 2

@@ -32,12 +32,9 @@ def row(number, seconds, size, *, steps=8, name="", status="done", is_measure=Fa
 def comparison(rows, bar=1e-3):
     measure = row(4, 30.0, bar, name="measure", is_measure=True)
     return Comparison(
-        scene="made up",
-        rows=(*rows, measure),
-        response="force",
-        measure="measure",
+        scene="made up", rows=(*rows, measure), response="force", measure="measure",
         uncertainty=errors(bar),
-    )
+    )  # fmt: skip
 
 
 def panels(figure):

@@ -34,6 +34,7 @@ def small(*overrides):
 
 
 def test_paper_has_every_kind_and_the_scene_itself():
+    """The scene comes first, the dearest last, and none twice."""
     found = made()
     kinds = {one.kind for one in found}
     assert kinds == {"analytic", "isolated", "consistent", "concurrent", "reference"}
@@ -42,16 +43,13 @@ def test_paper_has_every_kind_and_the_scene_itself():
     for kind in ("isolated", "consistent"):
         grids = {one.scene.patches.grid[0] for one in found if one.kind == kind}
         assert grids == {1, 2, 4, 8, 16}
-    (own,) = [one for one in found if one.name.startswith(OWN)]
-    assert own.scene.coupling == Scene.load(PAPER).coupling
-    assert own.scene.block == Scene.load(PAPER).block
-
-
-def test_the_scene_comes_first_the_dearest_last_and_none_twice():
-    found = made()
-    assert found[0].name.startswith(OWN)
+    own, given = found[0], Scene.load(PAPER)
+    assert own.name.startswith(OWN)
+    assert (own.scene.coupling, own.scene.block) == (given.coupling, given.block)
     assert (found[1].kind, found[-1].kind) == ("analytic", "reference")
     assert len({one.key for one in found}) == len({one.name for one in found}) == len(found)
+    for one in found:  # cells of the block are stated by laws on its mesh alone
+        assert (one.scene.block.cells is None) != one.scene.on_mesh
 
 
 def test_coarser_surfaces_still_carry_the_band():
@@ -170,11 +168,6 @@ def test_all_configurations_see_the_true_heights():
         assert small[0].name.removesuffix(SMALL_SLOPES) in names
 
 
-def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
-    for one in made():
-        assert (one.scene.block.cells is None) != one.scene.on_mesh
-
-
 def test_configurations_that_fit_no_memory_stay_and_say_so_when_they_are_run(monkeypatch):
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 30_000}  # 0.12 GB
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
@@ -191,14 +184,9 @@ def test_two_bodies_are_compared_without_meshed_roughness():
         "lengths": [1, 1],
     }
     elastic = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
-    scene = Scene.from_dict(
-        {
-            "surface": surface,
-            "counter_surface": surface,
-            "block": elastic,
-            "counter_body": elastic,
-            "load": {"approach": "4 um", "steps": 2},
-        }
-    )
+    scene = Scene.from_dict({
+        "surface": surface, "counter_surface": surface, "block": elastic, "counter_body": elastic,
+        "load": {"approach": "4 um", "steps": 2},
+    })  # fmt: skip
     kinds = {one.kind for one in configurations(scene)}
     assert kinds == {"analytic", "concurrent", "consistent"}

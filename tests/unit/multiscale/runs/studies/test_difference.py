@@ -281,17 +281,10 @@ def test_heights_of_different_zeros_count_from_first_touch():
     assert any("count from first touch" in note for note in both.notes)
 
 
-@pytest.mark.parametrize(
-    ("first", "second", "text"),
-    [
-        (
-            [1.0, 2.0],
-            [3.0, 4.0],
-            "mean pressure: the runs have none in common: 1 to 2 MPa in first",
-        ),
-        ([0.0, 0.0], [3.0, 4.0], "first: has no load step with a force"),
-    ],
-)
+@pytest.mark.parametrize(("first", "second", "text"), [
+    ([1.0, 2.0], [3.0, 4.0], "mean pressure: the runs have none in common: 1 to 2 MPa in first"),
+    ([0.0, 0.0], [3.0, 4.0], "first: has no load step with a force"),
+])  # fmt: skip
 def test_loads_that_do_not_overlap_are_refused(first, second, text):
     with pytest.raises(InputError, match=text):
         difference(power(7e4, 1.5, first), power(7e4, 1.5, second))
@@ -426,19 +419,6 @@ def refused(folders, tmp_path, capsys, *words):
     assert main(["compare", *map(str, folders), "--out", str(out), *words]) == 2
     assert not out.exists()
     return capsys.readouterr().err
-
-
-@pytest.mark.parametrize("name", ["history.csv", "patches.csv", "provenance.json"])
-def test_truncated_files_are_refused(folders, broken, tmp_path, capsys, name):
-    content = (broken / name).read_bytes()
-    (broken / name).write_bytes(content[: 2 * len(content) // 3])
-    said = refused((broken, folders[1]), tmp_path, capsys)
-    assert f"broken/{name}: " in said
-
-
-def test_other_kinds_of_results_are_refused(folders, broken, tmp_path, capsys):
-    (broken / "patches.csv").unlink()  # as in the results of a sweep
-    assert "patches.csv: cannot be read" in refused((broken, folders[1]), tmp_path, capsys)
 
 
 def test_other_units_are_refused(folders, broken, tmp_path, capsys):

@@ -45,51 +45,32 @@ def test_cases_are_all_combinations_the_last_key_fastest(scene):
     assert [case.scene.surface.spectrum.seed for case in cases] == [0, 1, 2, 0, 1, 2]
 
 
-@pytest.mark.parametrize(
-    ("text", "values"),
-    {
-        "a.b=2..5": [2, 3, 4, 5],
-        "a.b = -1..1": [-1, 0, 1],
-        "a.b=1 GPa, 4 GPa": ["1 GPa", "4 GPa"],
-        "a.b=0.5,1": [0.5, 1],
-        "a.b=true": [True],
-        "a.b=[[16, 16], [32, 32]]": [[16, 16], [32, 32]],
-        'a.b="x, y", z': ['"x', 'y"', "z"],
-    }.items(),
-)
+@pytest.mark.parametrize(("text", "values"), {
+    "a.b=2..5": [2, 3, 4, 5], "a.b = -1..1": [-1, 0, 1], "a.b=1 GPa, 4 GPa": ["1 GPa", "4 GPa"],
+    "a.b=0.5,1": [0.5, 1], "a.b=true": [True], "a.b=[[16, 16], [32, 32]]": [[16, 16], [32, 32]],
+    'a.b="x, y", z': ['"x', 'y"', "z"],
+}.items())  # fmt: skip
 def test_values_are_ranges_lists_or_texts(text, values):
     assert values_from_text(text) == ("a.b", values)
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    {
-        "a.b": "varies no key",
-        "=1": "varies no key",
-        "a.b=": "varies no key",
-        "a.b=5..2": r"--vary a.b = '5..2': is no range",
-        "a.b=0..10000000": "is no range",
-        "a.b=[1, 2": "is no list of values",
-        "a.b=[]": "is no list of values",
-        "a.b=1,,2": "is no list of values",
-    }.items(),
-)
+@pytest.mark.parametrize(("text", "problem"), {
+    "a.b": "varies no key", "=1": "varies no key", "a.b=": "varies no key",
+    "a.b=5..2": r"--vary a.b = '5..2': is no range", "a.b=0..10000000": "is no range",
+    "a.b=[1, 2": "is no list of values", "a.b=[]": "is no list of values",
+    "a.b=1,,2": "is no list of values",
+}.items())  # fmt: skip
 def test_what_varies_nothing_is_refused(text, problem):
     with pytest.raises(InputError, match=problem):
         values_from_text(text)
 
 
-@pytest.mark.parametrize(
-    ("vary", "problem"),
-    [
-        ({}, "varies nothing"),
-        ({SEED: []}, "has no values"),
-        ({SEED: [1, 1]}, "takes a value twice"),
-        ({SEED: [1, -1]}, r"surface.spectrum.seed = -1"),
-        ({"surface.sed": [1]}, "did you mean 'seed'|unknown key"),
-        ({"block.height": range(2000), SEED: range(2000)}, "make 4000000 cases"),
-    ],
-)
+@pytest.mark.parametrize(("vary", "problem"), [
+    ({}, "varies nothing"), ({SEED: []}, "has no values"), ({SEED: [1, 1]}, "takes a value twice"),
+    ({SEED: [1, -1]}, r"surface.spectrum.seed = -1"),
+    ({"surface.sed": [1]}, "did you mean 'seed'|unknown key"),
+    ({"block.height": range(2000), SEED: range(2000)}, "make 4000000 cases"),
+])  # fmt: skip
 def test_wrong_cases_are_refused_before_any_runs(scene, vary, problem):
     with pytest.raises(InputError, match=problem):
         sweep(scene, vary)
@@ -196,13 +177,10 @@ def legend(figure):
     ]
 
 
-@pytest.mark.parametrize(
-    ("load", "vary"),
-    [
-        ({"load.approach": "1 um"}, {SEED: range(3)}),
-        ({"load.force": "0.5 N"}, {MODULUS: ["1 GPa", "4 GPa"]}),
-    ],
-)
+@pytest.mark.parametrize(("load", "vary"), [
+    ({"load.approach": "1 um"}, {SEED: range(3)}),
+    ({"load.force": "0.5 N"}, {MODULUS: ["1 GPa", "4 GPa"]}),
+])  # fmt: skip
 def test_one_load_step_is_drawn_as_points(scene, load, vary):
     found = sweep(scene.with_(load | {"load.steps": 1}), vary)
     # a point of 4 pt is some 30 pixels at 100 dpi; lines through one point are none
@@ -462,14 +440,10 @@ def test_arrays_of_slurm_that_are_not_even_are_refused(
     assert words in told and told.count("\n") == 1 and not out.exists()
 
 
-@pytest.mark.parametrize(
-    ("words", "problem"),
-    [
-        (["--part", "3/2"], "is no part of a sweep"),
-        (["--part", "x"], "is no part of a sweep"),
-        (["--vary", "surface.spectrum.seed=-3..-1"], "surface.spectrum.seed"),
-    ],
-)
+@pytest.mark.parametrize(("words", "problem"), [
+    (["--part", "3/2"], "is no part of a sweep"), (["--part", "x"], "is no part of a sweep"),
+    (["--vary", "surface.spectrum.seed=-3..-1"], "surface.spectrum.seed"),
+])  # fmt: skip
 def test_wrong_words_write_nothing(file, tmp_path, capsys, words, problem):
     out = tmp_path / "out"
     assert main(["sweep", str(file), "--vary", f"{MODULUS}=1,2", "--out", str(out), *words]) == 2

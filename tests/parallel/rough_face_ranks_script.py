@@ -13,13 +13,9 @@ COMM = MPI.COMM_WORLD
 def main():
     surface = synthesise(Spectrum(**SPECTRUM, seed=5), grid=(64, 64), lengths=LENGTHS)
     reference = Reference(
-        surface=surface,
-        approaches=(4e-3, 8e-3),
-        plane=(6e-3, (3e-3, 0.0)),
-        edges=0.8,
-        count=1,
+        surface=surface, approaches=(4e-3, 8e-3), plane=(6e-3, (3e-3, 0.0)), edges=0.8, count=1,
         comm=COMM,
-    )
+    )  # fmt: skip
     problem, states = reference.solved(reference.shapes[0])
     found = {
         "force": [state.force for state in states],
