@@ -9,7 +9,6 @@ from patchlaw import run
 from patchlaw.geometry import Control
 from patchlaw.macro import ContactProblem, Interface, compat
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from tests.helpers.user_problems import elastic
 
 pytestmark = pytest.mark.long  # laws of eight worn samples: 8 s
@@ -159,7 +158,7 @@ def of_patches(kind, **changes):
 
 
 def test_laws_of_patches_run_in_as_their_cells(tmp_path):
-    """Laws follow the distance slid: what remains is linear between distances that double."""
+    """Laws follow the distance slid."""
     whole = ran_past(of_patches("consistent"), 2, tmp_path / "checkpoint.state")
     laws = whole.history()
     cells = run(of_patches("concurrent", output={"figures": False, "report": False}))
@@ -178,13 +177,6 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     _, (again,) = gone_on(of_patches("consistent"), tmp_path / "checkpoint.state")
     for name in ("approach_mm", "contact_area_fraction", "worn_volume_mm3", "dissipated_mJ"):
         assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
-    # a load step that is taken back takes back the laws that it wore, and what it prescribed
-    model = whole.coupling.model
-    model.restore(read_checkpoint(tmp_path / "checkpoint.state").state)
-    past, stiffness = model.past, model.stiffness()[:2]
-    model.press(Control(force=FORCE, slid=6.1e3))
-    model.past = past
-    assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-9)
 
 
 def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(tmp_path):
@@ -192,13 +184,16 @@ def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(tmp_path
     quiet = {"figures": False, "report": False, "check": "none"}
     load = {"force": "21 N", "steps": 1, "tilt": "free"}
     given, cells = (
-        of_patches(kind, load=load | {"sliding": slid}, output=quiet)
-        for kind, slid in (("consistent", [6.1e3]), ("concurrent", [3e3, 6.1e3]))
+        of_patches(kind, load=load | change, output=quiet)
+        for kind, change in (  # where steps may be halved laws are made at distances between
+            ("consistent", {"sliding": [6.1e3], "force_change": 0.9}),
+            ("concurrent", {"sliding": [3e3, 6.1e3]}),
+        )
     )
     laws = ran_past(given, 1, tmp_path / "checkpoint.state")
     model, (new, between, last) = laws.coupling.model, run(cells).steps
     past, stiffness = model.past, model.stiffness()[:2]
-    found = [*laws.history().steps, model.press(Control(force=21.0, tilt=None, slid=3e3))]
+    found = [*laws.history().steps[-2:], model.press(Control(force=21.0, tilt=None, slid=3e3))]
     for own, true in zip(found, (new, last, between), strict=True):
         for name, share in (("approach_mm", 2e-3), ("mean_separation_mm", 2e-3)):
             assert getattr(own, name) == pytest.approx(getattr(true, name), rel=share), name
