@@ -146,7 +146,7 @@ def of_patches(kind, **changes):
     block = {"young_modulus": "70 GPa", "poisson_ratio": 0.3, "height": "1 mm"}
     data = {
         "surface": {"spectrum": spectrum, "grid": [20, 20], "lengths": [0.93, 0.81]},
-        "block": block | ({"cells": [2, 2, 2]} if kind == "consistent" else {}),
+        "block": block,
         "coupling": {"kind": kind},
         "patches": {"grid": [2, 2]},
         "wear": {"coefficient": "3.1e-10 mm^2/N"},
