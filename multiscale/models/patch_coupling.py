@@ -134,8 +134,8 @@ class PatchCoupling(CellCoupling):
         Depths have the shape (nx, ny) [mm]; they differ by what has yielded. Errors are those by
         the steps of wear, see `micro.wear.Worn`.
 
-        The surface slides as a whole through all load steps, as it would without laws, by way of
-        distances that double from that of the first depth on.
+        The surface slides as a whole through all load steps, as it would without laws; where these
+        may be halved, by way of distances that double from that of the first depth on.
 
         Note:
             Collective.
@@ -146,7 +146,9 @@ class PatchCoupling(CellCoupling):
         if per_way == 0.0:  # nothing is touched, so nothing wears
             return []
         first = FIRST_DEPTH * roughness(surface).sq / per_way
-        doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
+        halved = self.scene.loading.force_change is not None
+        doublings = math.log2(max(path[-1].slid / first, 1.0)) if halved else 0.0
+        doubled = first * 2.0 ** np.arange(doublings)
         steps, before = [], None
         found: dict[float, tuple[Array, Array, Array]] = {}
         for step in path:
@@ -172,19 +174,11 @@ class PatchCoupling(CellCoupling):
         return max(contact.press(one).force_N for one in alone)
 
     def _with_wear(self, table: LawTable) -> LawTable:
-        """Return the laws with those of the surface as it runs in; collective.
-
-        They are those at the distances of load steps; at others, too, where load steps may be
-        halved in between.
-        """
+        """Return the laws with those of the surface as it runs in; collective."""
         parts, worn, error = self.parts, [], table.force_error
-        between = self.scene.loading.force_change is not None
-        stated = {step.slid for step in parts.path}
         lengths, tilt = parts.surface.lengths, parts.path.tilt
         load = Control(force=self._largest_force, tilt=tilt)
         for slid, depth, wear, _ in self.worn_depths:
-            if not (between or slid in stated):
-                continue
             means, lower = (field_means(one, lengths, parts.patches) for one in (wear, depth))
             options = self._options(None) | {"mean_heights": parts.mean_heights - lower}
             model = self._worn_model(depth)

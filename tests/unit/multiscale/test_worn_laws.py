@@ -208,6 +208,39 @@ def test_laws_of_patches_run_in_under_a_plane_that_turns_as_their_cells(tmp_path
     assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    "load",
+    [
+        {"force": "43 N", "steps": 1, "sliding": [1.1e3, 9.3e3]},
+        {"approach": "9 um", "steps": 1, "sliding": [4e3], "force_change": 0.4},
+    ],
+    ids=["nearly all in contact", "between two distances at a held approach"],
+)
+def test_laws_of_patches_close_as_their_cells(load):
+    """The pressure of a patch that is nearly closed is no function of its closure."""
+    spectrum = {"hurst": 0.8, "waves": [2, 8], "rms_slope": 0.1, "seed": 5}
+    changes = {
+        "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "height": 1.0},
+        "micro": {"finite_slopes": False},
+        "wear": {"coefficient": "1e-8 mm^2/N"},
+        "output": {"figures": False, "report": False, "check": "none"},
+    }
+    laws = run(of_patches("consistent", load=load, **changes))
+    slides = {"sliding": [one for one in laws.slid_mm if one], "force_change": None}
+    cells = run(of_patches("concurrent", load=load | slides, **changes))
+    last, count = cells.steps[-1], len(cells.steps)
+    for name, share in (
+        ("approach_mm", 2e-3),
+        ("force_N", 5e-3),
+        ("contact_area_fraction", 0.02),
+        ("worn_volume_mm3", 5e-3),
+    ):
+        given, true = (getattr(one, name)[-count:] for one in (laws, cells))
+        np.testing.assert_allclose(given, true, atol=share * true.max(), rtol=0.0, err_msg=name)
+    assert last.contact_area_fraction > 0.9 or (last.force_N < 0.5 * cells.force_N[0] and count > 3)
+
+
 def test_patches_that_nothing_touches_do_not_wear():
     load = {"approach": "0.01 um", "steps": 1, "tilt": "free", "sliding": [1.3e3]}
     last = run(of_patches("consistent", load=load)).steps[-1]
