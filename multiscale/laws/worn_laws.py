@@ -332,7 +332,7 @@ class SlidLaws:
 
     def along(self, approach: float) -> LawPoint:
         """Return what the laws give at an approach."""
-        return self._mixed(lambda *at: self._along(*at, approach))
+        return self._mixed(lambda one, laws: self._along(one, laws, approach))
 
     def untouched(self, closure: Array) -> LawPoint:
         """Return what the laws give at closures, (N,) [mm], up to first touch."""
