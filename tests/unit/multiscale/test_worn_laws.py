@@ -238,7 +238,7 @@ def test_laws_of_patches_close_as_their_cells(load):
     ):
         given, true = (getattr(one, name)[-count:] for one in (laws, cells))
         np.testing.assert_allclose(given, true, atol=share * true.max(), rtol=0.0, err_msg=name)
-    assert last.contact_area_fraction > 0.9 or (last.force_N < 0.5 * cells.force_N[0] and count > 3)
+    assert last.contact_area_fraction > 0.8 or (last.force_N < 0.5 * cells.force_N[0] and count > 2)
 
 
 def test_patches_that_nothing_touches_do_not_wear():
