@@ -3,7 +3,7 @@
     LawRows, PlanePath    columns of rows, first touch, repair; the plane's path    `rows`
     LawCurves, LawPoint   interpolants over the approach, what they give            `interpolation`
     PatchLaw, PatchLaws   the law of one patch, of many                             `patch_law`
-    RunningInLaws         laws of surfaces that have worn                           `worn_laws`
+    RunningInLaws         laws of samples that wear, SlidLaws those of patches      `worn_laws`
     LawTable              the laws of all patches, and their file                   `law_table`
     export_laws           files for spreadsheets, Abaqus, CalculiX and 4C           `export`
 

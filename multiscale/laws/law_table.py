@@ -22,7 +22,7 @@ from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
-from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
+from patchlaw.multiscale.laws.worn_laws import RunningInLaws, WornLaws
 from patchlaw.support import Array, Indices, InputError, check_fields, check_file, checked, located
 from patchlaw.support.files import check_hdf5, hdf5_bytes, write_bytes
 from patchlaw.support.packages import optional_packages
@@ -62,24 +62,6 @@ _FLOW, _PATH, _SPRINGS, _UNTOUCHED = "transmissivity", "path", "springs", "untou
 _UNTOUCHED_COLUMNS = [one.name for one in fields(Untouched)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class WornLaws:
-    """The laws of an interface that has worn, as functions of the closure of what is left.
-
-    Attributes:
-        depth: Depths that have worn off, volume per area of every patch or region, (N,) [mm].
-        laws: One law for each, whose closures are less by these depths.
-        slid: Distance that the whole surface has slid by then [mm], which laws of patches depend
-            on; None of those that depend on the depth.
-        path: The planes that pressed it, where they were free to turn.
-    """
-
-    depth: Array
-    laws: tuple[PatchLaw, ...]
-    slid: float | None = None
-    path: PlanePath | None = None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class LawTable(Displayed):
     """The laws of all patches of an interface, or of all regions of a face.
@@ -92,8 +74,7 @@ class LawTable(Displayed):
         force_error: Estimated error of the force between the rows, see
             `multiscale.laws.refinement`: of all patches together, or the largest where each was
             tabulated alone.
-        path: The planes that pressed the whole surface, where they were free to turn; None where
-            the tilt was prescribed, and for patches alone.
+        path: The planes that pressed the whole surface; None for patches alone and samples.
         worn: The laws as the roughness runs in, by rising depths; none where it does not. The file
             of the laws leaves them out.
 
@@ -119,10 +100,7 @@ class LawTable(Displayed):
         return self.laws[int(index)]
 
     def together(self) -> PatchLaws:
-        """Return the laws as one, which evaluates them together; see `SlidLaws` of what slides."""
-        slid = [level.slid for level in self.worn if level.slid is not None]
-        if slid:
-            return SlidLaws(self.levels, np.array([0.0, *slid]))
+        """Return the laws of the new interface as one, which evaluates them together."""
         return PatchLaws(self.laws)
 
     @property
@@ -132,29 +110,6 @@ class LawTable(Displayed):
             return None
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
         return RunningInLaws(self.levels, np.array(depths))
-
-    def transmissivities(
-        self, closure: Array, slid: float | None, cause: str | None = None, wider: float = 0.0
-    ) -> Array:
-        """Return the transmissivities of patches along x and y, shape (N, 2) [mm³].
-
-        Args:
-            closure: Closures of what is left of the patches, shape (N,) [mm].
-            slid: Distance that their surface has slid; None where nothing wears [mm].
-            cause: Cause of error that is varied, as for `Transmissivity.varied`.
-            wider: What is added to the mean gaps [mm].
-        """
-        laws, every = self.together(), np.arange(len(self.laws))
-        if isinstance(laws, SlidLaws):
-            laws.slid = slid or 0.0
-            gap = laws.at(every, closure, extend=True).separation + wider
-            return laws.transmissivities(gap, cause)
-        gap = laws.at(every, closure, extend=True).separation + wider
-        found = []
-        for law, one in zip(self.laws, gap, strict=True):
-            assert law.transmissivity is not None
-            found.append(law.transmissivity.varied(cause, np.array([one])))
-        return np.concatenate(found)
 
     @property
     def levels(self) -> list[tuple[PatchLaw, ...]]:

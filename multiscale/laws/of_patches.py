@@ -132,7 +132,7 @@ def consistent_laws(
         made_by=_made_by("consistent", model, tolerance)
         | {"tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}"},
         force_error=made.force,
-        path=whole.path if largest.tilt is None else None,
+        path=whole.path,
     )
 
 

@@ -20,8 +20,8 @@ from patchlaw.multiscale.laws.rows import LawRows, Transmissivity, Untouched
 from patchlaw.support import Array, Indices, InputError
 from patchlaw.support.readable import Displayed, Table, column, of_columns, span, spread
 
-_ROUNDING = 1e-12
-"""Share of the end of a table by which a converged closure may exceed it."""
+ROUNDING = 1e-12
+"""Share of the end of a table by which a converged closure or approach may exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -319,6 +319,19 @@ class PatchLaws:
         """Return −dp/dū at points of the laws of patches, or of one for each, as of `PatchLaw`."""
         return self.curves.interface_stiffness(self._index if patch is None else patch, point)
 
+    def transmissivities(self, separation: Array, cause: str | None = None) -> Array:
+        """Return the transmissivities of all laws along x and y, shape (N, 2) [mm³].
+
+        Args:
+            separation: Mean gaps, shape (N,) [mm].
+            cause: As for `Transmissivity.varied`.
+        """
+        found = []
+        for law, one in zip(self.laws, separation[:, None], strict=True):
+            assert law.transmissivity is not None
+            found.append(law.transmissivity.varied(cause, one))
+        return np.concatenate(found)
+
     def pressures(self, patch: Indices, closure: Array, depth: Array) -> Array:
         """Return pressures at closures of patches, with tangents beyond the tables, (n,) [MPa]."""
         return self.at(patch, closure, extend=True).pressure
@@ -336,7 +349,7 @@ class PatchLaws:
     def _ends(self) -> Array:
         """Ends of the tables, with the rounding that converged closures may exceed them by."""
         ends = np.array([law.range[1] for law in self.laws])
-        return np.asarray(ends + _ROUNDING * np.abs(ends))
+        return np.asarray(ends + ROUNDING * np.abs(ends))
 
 
 def repaired_law(law: PatchLaw) -> PatchLaw:

@@ -6,15 +6,16 @@ to the same depth under pressures of 1 to 4 have nearly the same law, and those 
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
 changes its shape with W. Between two depths its closure is interpolated linearly at equal pressure,
 as curves that are steep lie beside each other; beyond the last depth it stays. Patches of one
-surface, which share their load, wear with the distance that all of it has slid.
+surface, which share their load, wear with the distance that all of it has slid; their laws are
+taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -22,14 +23,10 @@ import numpy as np
 import scipy
 
 from patchlaw.multiscale.laws.interpolation import LawPoint, root_within
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
-from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.laws.patch_law import ROUNDING, PatchLaw, PatchLaws
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.support import Array, Indices, InputError
 
-_BEYOND = 1e-3
-"""Share of the end of a table by which a converged closure may exceed it, along the tangent. On
-drawn faces near full contact, where closures end, it was 7e-6 to 4e-4, 1.6e-3 and 2e-2; with 4e-4
-approaches were those of cells within 0.3 %, and contact areas within 10 %."""
 _STEEPEST = 0.1
 """Slope of the closure over q where a law begins and ends, over that of its piece, at least."""
 
@@ -204,7 +201,7 @@ class RunningInLaws:
     def _check(self, closure: Array, between: Between) -> None:
         """Refuse closures beyond the end of the law."""
         ends = _blended(self._ends, between, np.zeros(len(closure), np.intp))
-        beyond = closure > ends + _BEYOND * np.abs(ends)
+        beyond = closure > ends + ROUNDING * np.abs(ends)
         if beyond.any():
             worst = int(np.argmax(closure - ends))
             raise InputError(
@@ -257,75 +254,147 @@ class RunningInLaws:
         )
 
 
-class SlidLaws(PatchLaws):
-    """Laws of patches that depend on the distance that their surface has slid as a whole.
-
-    A patch that touches late, or whose neighbours take over its load, does not tell by its own
-    depth how they have worn.
-
-    Args:
-        levels: The N laws at every one of L distances.
-        distances: These distances, rising from 0, shape (L,) [mm].
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WornLaws:
+    """The laws of an interface that has worn, as functions of the closure of what is left.
 
     Attributes:
-        slid: The distance that laws are those of [mm]; set it as the surface slides.
+        depth: Depths that have worn off, volume per area of every patch or region, (N,) [mm].
+        laws: One law for each, whose closures are less by these depths.
+        slid: Distance that the whole surface has slid by then [mm], which laws of patches depend
+            on; None of those that depend on the depth.
+        path: The planes that pressed the whole surface; None where laws are those of samples.
     """
 
-    def __init__(self, levels: Sequence[Sequence[PatchLaw]], distances: Array) -> None:
-        super().__init__(levels[0])
-        each = np.repeat(distances[:, None], len(levels[0]), axis=1)
-        self._running, self.slid = RunningInLaws(levels, each), 0.0
-        self._levels, self._distances = [PatchLaws(laws) for laws in levels], distances
+    depth: Array
+    laws: tuple[PatchLaw, ...]
+    slid: float | None = None
+    path: PlanePath | None = None
 
-    def at(
+    @property
+    def planes(self) -> PlanePath:
+        """The planes that pressed the whole surface."""
+        assert self.path is not None, "laws of whole surfaces have paths"
+        return self.path
+
+    @property
+    def end(self) -> float:
+        """The largest approach that laws were made for [mm]."""
+        return float(self.planes.approach[-1])
+
+
+Level = tuple[WornLaws, PatchLaws]
+"""What a surface has become by a distance, and its laws together."""
+
+
+class SlidLaws:
+    """Laws along the path of the plane that they were made under, of a surface that has slid.
+
+    A patch that touches late, or whose neighbours take over its load, does not tell by its own
+    depth how they have worn. Laws and path are therefore those of the distance that the surface has
+    slid as a whole. Between two distances they are linear in the worn volume, at approaches equally
+    far from those of the largest load. The volume is cubic in the distance, with the rates of wear
+    at both ends: at a held approach it grows by less and less.
+
+    Args:
+        levels: What the surface has become by these distances, the new one first.
+        slid: The distance [mm].
+        lean: Local approaches of the patches less that of the middle, (N,) [mm]; zero where a free
+            plane presses, as rows then know the middle alone.
+        rate: Returns the mean depth that wears off per distance slid; None where it is the same at
+            both distances.
+
+    Attributes:
+        worn: Depths that have worn off the patches, shape (N,) [mm].
+        path: How the plane turns.
+    """
+
+    def __init__(
         self,
-        patch: Indices | int,
-        closure: Array,
-        depth: Array | None = None,
-        *,
-        extend: bool = False,
-    ) -> LawPoint:
-        """Return what laws give at closures of what is left, as of `PatchLaws`."""
-        every = np.broadcast_to(patch, closure.shape)
-        point = self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)
-        free = np.flatnonzero(point.pressure == 0.0)
-        if len(free):
-            point.separation[free], point.dseparation[free] = self._untouched(
-                every[free], closure[free]
-            )
-        return point
+        levels: Sequence[Level],
+        slid: float,
+        lean: Array | float = 0.0,
+        rate: Callable[[SlidLaws], float] | None = None,
+    ) -> None:
+        distances = [one.slid or 0.0 for one, _ in levels]
+        place = float(np.interp(slid, distances, np.arange(len(distances))))
+        below, share = int(place), place % 1.0
+        if share and rate is not None:
+            two = (below, below + 1)
+            ends = [SlidLaws(levels[one : one + 1], distances[one], lean) for one in two]
+            share = worn_share(share, float(np.diff(distances)[below]), ends, rate)
+        parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
+        self._parts, self.slid, self._lean = parts[: 1 + (share > 0.0)], slid, lean
+        self.worn: Array = np.sum([part * one.depth for part, one, _ in self._parts], axis=0)
+        self._end = float(sum(part * one.end for part, one, _ in self._parts))
+        path, *further = (one.planes.shifted(-one.end) for _, one, _ in self._parts)
+        self.path = (path.mixed(further[0], share) if further else path).shifted(self._end)
 
-    def _untouched(self, patch: Indices, closure: Array) -> tuple[Array, Array]:
-        """Return the gaps before first touch, linear between distances equally far from it."""
-        at = float(np.interp(self.slid, self._distances, np.arange(len(self._levels))))
-        below = min(int(at), len(self._levels) - 2)
-        levels = self._levels[below : below + 2]
-        share, touches = at - below, [level.first_touch[patch] for level in levels]
-        found = []
-        for touch, level in zip(touches, levels, strict=True):
-            with np.errstate(invalid="ignore"):  # what has nothing to touch
-                moved = touch - ((1.0 - share) * touches[0] + share * touches[1])
-            moved = np.where(np.isfinite(moved), moved, 0.0)
-            # it may be touched there by rounding
-            point = level.at(patch, np.minimum(closure + moved, touch), extend=True)
-            found.append((point.separation, point.dseparation))
-        (low, falls), (high, falls_there) = found
-        return (1.0 - share) * low + share * high, (1.0 - share) * falls + share * falls_there
+    def along(self, approach: float) -> LawPoint:
+        """Return what the laws give at an approach."""
+        return self._mixed(lambda one, laws: self._along(one, laws, approach))
 
-    def transmissivities(self, separation: Array, cause: str | None = None) -> Array:
-        """Return the transmissivities of all laws along x and y, shape (N, 2) [mm³].
+    def untouched(self, closure: Array) -> LawPoint:
+        """Return what the laws give at closures, (N,) [mm], up to first touch."""
+        return self._mixed(lambda _, laws: _untouched(laws, closure))
+
+    def interface_stiffness(self, approach: float) -> Array:
+        """Return −dp/dū of the patches at an approach, shape (N,) [MPa/mm]."""
+        each = (
+            part * laws.interface_stiffness(self._along(one, laws, approach))
+            for part, one, laws in self._parts
+        )
+        return np.sum(list(each), axis=0)
+
+    def transmissivities(
+        self, approach: float, closure: Array, cause: str | None = None, wider: float = 0.0
+    ) -> Array:
+        """Return the transmissivities along x and y, shape (N, 2) [mm³].
+
+        Hydraulic gaps are linear between those of two distances.
 
         Args:
-            separation: Mean gaps, shape (N,) [mm].
-            cause: As for `Transmissivity.varied`.
+            approach: The approach [mm].
+            closure: Closures of what is left, which patches without load have gaps by, (N,) [mm].
+            cause: Cause of error that is varied, as for `Transmissivity.varied`.
+            wider: What is added to the mean gaps [mm].
         """
-        slid, gaps = np.array([self.slid]), separation[:, None]
-        flows = [self._running.leak(one, gap, slid, cause) for one, gap in enumerate(gaps)]
-        return np.concatenate(flows)
+        gaps: Any = 0.0
+        for part, one, laws in self._parts:
+            point = self._along(one, laws, approach)
+            free = _untouched(laws, closure).separation
+            separation = np.where(point.pressure > 0.0, point.separation, free) + wider
+            gaps = gaps + part * np.cbrt(laws.transmissivities(separation, cause))
+        return np.asarray(gaps**3)
 
-    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
-        """Return −dp/dū at points of the laws, as of `PatchLaws`."""
-        return self._running.interface_stiffness(point)
+    def _along(self, one: WornLaws, laws: PatchLaws, approach: float) -> LawPoint:
+        """Return what laws of one distance give, equally far from the end of their rows."""
+        return laws.along(approach - self._end + one.end + self._lean - one.depth)
+
+    def _mixed(self, evaluate: Callable[[WornLaws, PatchLaws], LawPoint]) -> LawPoint:
+        found = ((part, evaluate(one, laws)) for part, one, laws in self._parts)
+        points = ([part * field for field in point] for part, point in found)
+        return LawPoint._make(np.sum(fields, axis=0) for fields in zip(*points, strict=True))
+
+
+def _untouched(laws: PatchLaws, closure: Array) -> LawPoint:
+    """Return what laws give at closures, (N,) [mm], up to first touch."""
+    return laws.at(np.arange(len(closure)), np.minimum(closure, laws.first_touch))
+
+
+def worn_share(
+    share: float, way: float, ends: Sequence[SlidLaws], rate: Callable[[SlidLaws], float]
+) -> float:
+    """Return the part of the volume worn between two distances by a part of the way [mm].
+
+    It is Hermite's cubic, with slopes within thrice the mean so that it rises (Fritsch & Carlson
+    1980, doi:10.1137/0717021).
+    """
+    wears = float(ends[1].worn.mean() - ends[0].worn.mean())
+    if not wears > 0.0:
+        return share
+    first, last = (min(rate(one) * way / wears, 3.0) for one in ends)
+    return share * (first + share * (3.0 - 2.0 * first - last + share * (first + last - 2.0)))
 
 
 Between = tuple[Indices, Array, Array, Indices]

@@ -18,7 +18,6 @@ from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.worn_laws import SlidLaws
 from patchlaw.multiscale.loading.load_step import CLEAR, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support import Array, Indices, InputError, NotConverged
@@ -242,7 +241,6 @@ class FaceContact(LawModel):
     @past.setter
     def past(self, past: Any) -> None:
         self._problem.past, self._last, self._slid = past
-        self._laws_at(self._slid.distance)
 
     @property
     def slips(self) -> Any:
@@ -275,22 +273,19 @@ class FaceContact(LawModel):
     def _slid_to(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium of a load step, at the end of what the face slides and wears."""
         problem, further = self._problem, control.slid - self._slid.distance
-        self._laws_at(self._slid.distance)
         if self._wear is not None and problem.sliders is not None:
             return self._fretted(control, self._wear)
         if self._wear is None or not further > 0.0:
             return problem.solve(control)
         start, linear = self._last or problem.solve(control), [0]
         each = further * self._wear[problem.sampling.patch]
-        slid = {id(start): (self._slid.distance, self._slid.forces)}
+        forces = {id(start): self._slid.forces}
 
         def press(share: float, before: FaceEquilibrium, _: Any) -> FaceEquilibrium:
             problem.go_back_to(before)
-            (began, forces), way = slid[id(before)], share * further
-            self._laws_at(began + way)
             state = problem.solve(control, share * each)
             linear[0] += state.linear_iterations
-            slid[id(state)] = began + way, forces + way * state.patch_force
+            forces[id(state)] = forces[id(before)] + share * further * state.patch_force
             return state
 
         def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float, float]:
@@ -298,11 +293,9 @@ class FaceContact(LawModel):
             return float(problem.sampling.patch_sums(change).sum()), middle.force, twice.force
 
         found = slide_in_steps(press, start, moved, start.force)
-        self._laws_at(control.slid)
         once, end = self._read_off(found.once), self._read_off(found.state)  # goes on from the last
         errors = np.add(self._slid.errors, SAFE * np.abs(np.subtract(once, end)))
-        _, forces = slid[id(found.state)]
-        self._slid = Slid(control.slid, tuple(errors.tolist()), forces)
+        self._slid = Slid(control.slid, tuple(errors.tolist()), forces[id(found.state)])
         return replace(found.state, iterations=found.iterations, linear_iterations=linear[0])
 
     def _fretted(self, control: Control, wear: Array) -> FaceEquilibrium:
@@ -317,11 +310,6 @@ class FaceContact(LawModel):
             distance=self._slid.distance + (worn / per_way if per_way > 0.0 else 0.0)
         )
         return state
-
-    def _laws_at(self, slid: float) -> None:
-        """Take the laws of a surface that has slid by a distance [mm], where they know it."""
-        if isinstance(self._laws, SlidLaws):
-            self._laws.slid = slid
 
     def _read_off(self, state: FaceEquilibrium) -> tuple[float, ...]:
         """Return what errors by the steps of wear are of, see `micro.wear.Worn`; go back to it."""
@@ -438,7 +426,6 @@ class FaceContact(LawModel):
     def _solve_again(self, state: Any) -> None:
         """Find an equilibrium again, where nothing slips further."""
         approach, tilt, pressure, body_state, _ = state
-        self._laws_at(self._slid.distance)
         sliders, forces, shear = self._problem.sliders, self._problem.forces, None
         memory, worn, forces.slip_wear = self.slips, forces.slip_wear, None
         if sliders is not None:

@@ -6,7 +6,6 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,9 +15,10 @@ from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.rigid_plane import UNSUPPORTED, plane_failure
 from patchlaw.micro import NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint
-from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
+from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import Displacements
-from patchlaw.multiscale.laws.patch_law import PatchLaws
+from patchlaw.multiscale.laws.patch_law import ROUNDING, PatchLaws
+from patchlaw.multiscale.laws.worn_laws import SlidLaws, WornLaws
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.loaded_patches import (
     TOLERANCE,
@@ -27,7 +27,7 @@ from patchlaw.multiscale.models.loaded_patches import (
     check_compliance,
     whole_stiffness,
 )
-from patchlaw.multiscale.models.problem import ROUNDING, LawModel, in_one_line
+from patchlaw.multiscale.models.problem import LawModel, in_one_line
 from patchlaw.support import Array, NotConverged, checked
 
 
@@ -94,95 +94,14 @@ class PatchContact(LawModel):
         self._last = state
 
 
-class _FreeLaws:
-    """Laws under a plane without moment, of a surface that has slid by some distance.
+class PathContact(LawModel):
+    """Consistent laws along the path of the plane that they were made under.
 
-    They and the path of the plane are linear in the worn volume between two distances, at
-    approaches equally far from those of the largest load. The volume is cubic in the distance, with
-    the rates of wear at both ends: at a held approach it grows by less and less.
-
-    Args:
-        levels: What the surface has become by these distances, the new one first.
-        slid: The distance [mm].
-        rate: Returns the mean depth that wears off per distance slid; None where it is the same at
-            both distances.
-
-    Attributes:
-        worn: Depths that have worn off the patches, shape (N,) [mm].
-        path: How the plane turns.
-    """
-
-    def __init__(
-        self,
-        levels: Sequence[tuple[WornLaws, PatchLaws]],
-        slid: float,
-        rate: Callable[[_FreeLaws], float] | None = None,
-    ) -> None:
-        distances = [one.slid or 0.0 for one, _ in levels]
-        place = float(np.interp(slid, distances, np.arange(len(distances))))
-        below, share = int(place), place % 1.0
-        if share and rate is not None:
-            ends = [_FreeLaws(levels[one : one + 1], distances[one]) for one in (below, below + 1)]
-            share = _worn_share(share, float(np.diff(distances)[below]), ends, rate)
-        parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
-        self._parts, self.slid = parts[: 1 + (share > 0.0)], slid
-        self.worn: Array = np.sum([part * one.depth for part, one, _ in self._parts], axis=0)
-        self._end = float(sum(part * _end(one) for part, one, _ in self._parts))
-        path, *further = (one.path.shifted(-_end(one)) for _, one, _ in self._parts if one.path)
-        self.path = (path.mixed(further[0], share) if further else path).shifted(self._end)
-
-    def along(self, approach: float) -> LawPoint:
-        """Return what the laws give at an approach."""
-        return self._mixed(lambda one, laws: laws.along(self._local(one, approach)))
-
-    def untouched(self, closure: Array) -> LawPoint:
-        """Return what the laws give at closures, (N,) [mm], up to first touch."""
-        every = np.arange(len(closure))
-        return self._mixed(lambda _, laws: laws.at(every, np.minimum(closure, laws.first_touch)))
-
-    def interface_stiffness(self, approach: float) -> Array:
-        """Return −dp/dū of the patches at an approach, shape (N,) [MPa/mm]."""
-        points = ((*one, one[2].along(self._local(one[1], approach))) for one in self._parts)
-        return np.sum([part * laws.interface_stiffness(at) for part, _, laws, at in points], axis=0)
-
-    def _local(self, one: WornLaws, approach: float) -> Array:
-        """Return local approaches at one of the distances, equally far from the end of its rows."""
-        return approach - self._end + _end(one) - one.depth
-
-    def _mixed(self, evaluate: Callable[[WornLaws, PatchLaws], LawPoint]) -> LawPoint:
-        found = ((part, evaluate(one, laws)) for part, one, laws in self._parts)
-        points = ([part * field for field in point] for part, point in found)
-        return LawPoint._make(np.sum(fields, axis=0) for fields in zip(*points, strict=True))
-
-
-def _worn_share(
-    share: float, way: float, ends: Sequence[_FreeLaws], rate: Callable[[_FreeLaws], float]
-) -> float:
-    """Return the part of the volume worn between two distances by a part of the way [mm].
-
-    It is Hermite's cubic, with slopes within thrice the mean so that it rises (Fritsch & Carlson
-    1980, doi:10.1137/0717021).
-    """
-    wears = float(ends[1].worn.mean() - ends[0].worn.mean())
-    if not wears > 0.0:
-        return share
-    first, last = (min(rate(one) * way / wears, 3.0) for one in ends)
-    return share * (first + share * (3.0 - 2.0 * first - last + share * (first + last - 2.0)))
-
-
-def _end(level: WornLaws) -> float:
-    """Return the largest approach that laws were made for [mm]."""
-    assert level.path is not None, "laws of free planes have paths"
-    return float(level.path.approach[-1])
-
-
-class FreePlaneContact(LawModel):
-    """Consistent laws under a plane without moment.
-
-    The moment of the contacts decides how such a plane turns. Mean pressures of few large patches
-    do not tell that moment, and a single law knows nothing of it. Therefore the plane turns as it
-    did in the rows of the laws, where the macro model that the laws were made for is in equilibrium
-    with their pressures.
+    Of a plane without moment that of the contacts decides how it turns: mean pressures of few large
+    patches do not tell it, and a single law knows nothing of it. A surface that wears does so under
+    the pressures of its cells, to which near full contact laws are no functions of closure. So
+    load steps are those of the rows of the laws, where the macro model that these were made for is
+    in equilibrium with their pressures.
 
     Every load step is found without those before it.
 
@@ -190,6 +109,7 @@ class FreePlaneContact(LawModel):
         table: The laws, with the path of the plane; those of a surface that wears have theirs too.
         displacements: Mean displacements of the patches by their pressures in the macro model.
             Collective.
+        tilt: Slopes of the plane; None where it was free to turn.
         wear: Coefficient of wear of a surface that slides [mm²/N].
         friction: Coefficient of the friction whose energy is told of what slides.
 
@@ -197,24 +117,35 @@ class FreePlaneContact(LawModel):
         ValueError: When the laws have no path.
     """
 
-    wear_errors = (0.0,) * 6
-    """Errors by the steps of wear beyond those of the surface, see `micro.wear.Worn`."""
-
     def __init__(
         self,
         table: LawTable,
         displacements: Displacements,
+        tilt: tuple[float, float] | None = None,
         wear: float = 0.0,
         friction: float = 0.0,
     ) -> None:
         if table.path is None:
-            raise ValueError("the laws were made under a plane of given tilt")
+            raise ValueError("the laws were not made of a whole surface")
         super().__init__(table)
         new = WornLaws(depth=np.zeros(table.grid.count), laws=table.laws, slid=0.0, path=table.path)
         self._levels = [(one, PatchLaws(one.laws)) for one in (new, *table.worn)]
         self._displacements, self.wears = displacements, wear > 0.0
+        self._lean = 0.0 if tilt is None else self._local(0.0, *tilt)
         self._wear, self._friction = wear, friction
-        self.past: tuple[_FreeLaws, float, LawPoint] | None = None
+        self.past: tuple[SlidLaws, float, LawPoint] | None = None
+
+    def _local(self, approach: float, *tilt: float) -> Array:
+        """Return the local approaches of the patches, or what they change by, (N,) [mm]."""
+        patches = self.table.grid
+        centre: Any = tuple(map(float, patches.middle))
+        plane: Any = {"approach": approach, "tilt": tilt, "centre": centre}
+        return np.asarray(RigidPlane(**plane).means(patches))
+
+    def _laws_at(self, slid: float, approach: float | None) -> SlidLaws:
+        """Return the laws of the surface that has slid by a distance [mm], at a held approach."""
+        rate = None if approach is None else lambda one: self._rate(one.along(approach))
+        return SlidLaws(self._levels, slid, self._lean, rate)
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `Model.press`.
@@ -222,9 +153,8 @@ class FreePlaneContact(LawModel):
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        patches, approach, evaluations = self.table.grid, control.approach, 0
-        rate = None if approach is None else lambda one: self._rate(one.along(approach))
-        laws = _FreeLaws(self._levels, control.slid, rate)
+        approach, evaluations = control.approach, 0
+        laws = self._laws_at(control.slid, approach)
         path = laws.path
         if approach is None:
             approach, evaluations = path.approach_under(
@@ -235,9 +165,7 @@ class FreePlaneContact(LawModel):
             problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
             raise self.beyond_law(control, problem)
         tx, ty, *moment = map(float, path.at(approach))
-        point = laws.along(approach)
-        xc, yc = map(float, patches.middle)
-        local = RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)).means(patches)
+        point, local = laws.along(approach), self._local(approach, tx, ty)
         closure = local - laws.worn - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0
@@ -255,7 +183,7 @@ class FreePlaneContact(LawModel):
         separation = np.where(point.pressure > 0.0, point.separation, open_.separation)
         stiffness = laws.interface_stiffness(approach)
         return LoadStep.of_patches(
-            patches,
+            self.table.grid,
             plane=(approach, tx, ty),
             load=(self._force(point), *moment),
             patches=PatchState(closure, point.pressure, point.contact_area_fraction, stiffness),
@@ -265,7 +193,7 @@ class FreePlaneContact(LawModel):
             **self._of_wear(laws),
         )
 
-    def _of_wear(self, laws: _FreeLaws) -> dict[str, Any]:
+    def _of_wear(self, laws: SlidLaws) -> dict[str, Any]:
         """Return what has worn off the surface."""
         if not self.wears:
             return {}
@@ -277,6 +205,16 @@ class FreePlaneContact(LawModel):
             "worn_depth_mm": float(laws.worn.max()),
         } | ({"dissipated_mJ": self._friction / self._wear * volume} if self._friction else {})
 
+    def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
+        """Return pressures of patches, and what has worn off them; see `write_solved`."""
+        pressure, worn = step.patches.pressure_MPa, self.past and self.past[0].worn
+        return np.array([pressure, worn]) if self.wears else pressure
+
+    def transmissivities(self, step: LoadStep, cause: str | None, wider: float) -> Array:
+        """Return the transmissivities of the patches; see `LawModel.transmissivities`."""
+        laws = self._laws_at(step.slid_mm or 0.0, step.approach_mm)
+        return laws.transmissivities(step.approach_mm, step.patches.closure_mm, cause, wider)
+
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""
         if self.past is None:
@@ -284,9 +222,7 @@ class FreePlaneContact(LawModel):
         laws, approach, open_ = self.past
         patches, point = self.table.grid, laws.along(approach)
         force = patches.area * float(point.dpressure.sum())
-        tx, ty = map(float, laws.path.turning(approach))
-        xc, yc = map(float, patches.middle)
-        coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
+        coming = self._local(1.0, *map(float, laws.path.turning(approach)))
         closing = coming - self._displacements(point.dpressure[None])[0]
         closing *= -open_.dseparation
         closed = np.where(point.pressure > 0.0, -point.dseparation, closing)

@@ -17,13 +17,14 @@ from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
-from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
+from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.laws.worn_laws import WornLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.cell_coupling import CellCoupling, as_worn
 from patchlaw.multiscale.models.face_contact import FaceContact
-from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
+from patchlaw.multiscale.models.patch_contact import PatchContact, PathContact
 from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
 from patchlaw.support import Array, on_root, on_root_alone
 from patchlaw.support.readable import ProgressObserver, times
@@ -120,8 +121,7 @@ class PatchCoupling(CellCoupling):
             self.parts.patches,
             largest=largest,
             displacements=self.bodies.patch_displacements(self.table_rows),
-            # closures between two depths are not those of rows
-            pointwise=self.scene.coupling.interface == "pointwise" or self.scene.wears_on_mesh,
+            pointwise=self.scene.coupling.interface == "pointwise",
             **options,
         )
 
@@ -134,8 +134,8 @@ class PatchCoupling(CellCoupling):
         Depths have the shape (nx, ny) [mm]; they differ by what has yielded. Errors are those by
         the steps of wear, see `micro.wear.Worn`.
 
-        The surface slides as a whole through all load steps, as it would without laws, by way of
-        distances that double from that of the first depth on.
+        The surface slides as a whole through all load steps, as it would without laws; where these
+        may be halved, by way of distances that double from that of the first depth on.
 
         Note:
             Collective.
@@ -146,7 +146,9 @@ class PatchCoupling(CellCoupling):
         if per_way == 0.0:  # nothing is touched, so nothing wears
             return []
         first = FIRST_DEPTH * roughness(surface).sq / per_way
-        doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
+        halved = self.scene.loading.force_change is not None
+        doublings = math.log2(max(path[-1].slid / first, 1.0)) if halved else 0.0
+        doubled = first * 2.0 ** np.arange(doublings)
         steps, before = [], None
         found: dict[float, tuple[Array, Array, Array]] = {}
         for step in path:
@@ -196,20 +198,20 @@ class PatchCoupling(CellCoupling):
         """Return what has worn off the cells behind laws at a load step; None where nothing has."""
         if not (step.slid_mm and self.worn_depths):
             return None
-        new = 0.0, np.zeros(()), None, None
-        slid, depths, _, _ = zip(new, *self.worn_depths, strict=True)
-        after = min(int(np.searchsorted(slid, step.slid_mm)), len(slid) - 1)
-        share = (step.slid_mm - slid[after - 1]) / (slid[after] - slid[after - 1])
-        return np.asarray(depths[after - 1] + share * (depths[after] - depths[after - 1]))
+        depths = [np.zeros(()), *(lowered for _, lowered, _, _ in self.worn_depths)]
+        means = [0.0, *(float(worn.mean()) for _, _, worn, _ in self.worn_depths)]
+        place = float(np.interp(step.mean_worn_depth_mm or 0.0, means, np.arange(len(means))))
+        below = min(int(place), len(depths) - 2)
+        return np.asarray(depths[below] + (place - below) * (depths[below + 1] - depths[below]))
 
     def errors_of_wear(self, step: LoadStep) -> tuple[float, ...]:
-        """Return the errors by the steps of wear, of the laws' surface and of the face under them.
+        """Return the errors by the steps of wear of the laws' surface.
 
         The largest depth is that of patches, which errs at most as that of cells.
         """
-        own, slid = self.model.wear_errors, step.slid_mm or 0.0  # type: ignore[attr-defined]
+        slid = step.slid_mm or 0.0
         before = [errors for way, _, _, errors in self.worn_depths if way <= slid]
-        return tuple(np.add(own, before[-1]).tolist()) if before else own
+        return tuple(before[-1].tolist()) if before else super().errors_of_wear(step)
 
     def model_alone(self) -> MicroModel:
         """Return the micro model on a half-space, which patches are pressed on alone."""
@@ -275,29 +277,25 @@ class PatchCoupling(CellCoupling):
     def _make_model(self) -> Model:
         """Make what finds load steps: on the mesh, or on the compliance of patches.
 
-        A free plane turns as it did in the rows of its laws.
+        Free planes, and what wears, follow the rows of the laws.
         """
-        table, section = self.make_laws(), self.scene.wear
+        table, section, tilt = self.make_laws(), self.scene.wear, self.parts.path.tilt
         if section is not None and not table.worn:  # kept laws are those of new surfaces
             with self.clock.phase("laws"):
                 table = self.table = self._with_wear(table)
-        if table.path is not None and self._pressed_evenly:
+        if table.path is not None and self._pressed_evenly and (tilt is None or section):
             moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
             coefficients = (one.coefficient if one and section else 0.0 for one in (section, rubs))
-            return FreePlaneContact(table, moved, *coefficients)
+            return PathContact(table, moved, tilt, *coefficients)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
 
         face = self.bodies.contact_face
         mode, rubs = self.scene.coupling.interface, self.scene.friction
-        friction = Friction(coefficient=rubs.coefficient) if rubs and not section else None
+        friction = Friction(coefficient=rubs.coefficient) if rubs else None
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        wear = np.full(len(table.laws), section.coefficient) if section else None
-        made = FaceContact(problem, table, face, wear)
-        if wear is not None and rubs is not None:
-            made.rubs = np.full(len(wear), rubs.coefficient)
-        return made
+        return FaceContact(problem, table, face)
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""

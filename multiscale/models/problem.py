@@ -225,10 +225,6 @@ def in_one_line(places: Array) -> bool:
     return bool(np.linalg.det(spread) <= 1e-9 * np.trace(spread) ** 2)
 
 
-ROUNDING = 1e-12
-"""Share of a law's end by which a converged approach may exceed it."""
-
-
 class BeyondLaws(NotConverged):
     """A patch is outside the range of its law, where smaller load steps do not help."""
 
@@ -242,6 +238,18 @@ class LawModel(Model):
 
     def __init__(self, table: LawTable) -> None:
         self.table = table
+
+    def transmissivities(self, step: LoadStep, cause: str | None, wider: float) -> Array:
+        """Return the transmissivities of patches along x and y at a load step, (N, 2) [mm³].
+
+        Args:
+            step: The load step.
+            cause: Cause of error that is varied, as for `Transmissivity.varied`.
+            wider: What is added to the mean gaps [mm].
+        """
+        laws, closure = self.table.together(), step.patches.closure_mm
+        point = laws.at(np.arange(len(closure)), closure, extend=True)
+        return laws.transmissivities(point.separation + wider, cause)
 
     def beyond_law(self, control: Control, problem: str, *, falls: bool = False) -> BeyondLaws:
         """Return the error of a patch outside the range of its law.

@@ -20,10 +20,11 @@ from patchlaw.micro.closed_forms import crowned_peak
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
-from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
+from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.laws.worn_laws import WornLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe

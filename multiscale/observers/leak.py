@@ -460,14 +460,13 @@ class PatchLeakObserver(LeakObserver):
 
     def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
         """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
-        table, wider = self._coupling.table, 0.0
-        assert table is not None
+        coupling: Any = self._coupling
+        wider = 0.0
         if cause == _WEAR:
-            coupling: Any = self._coupling
             cause, wider = None, coupling.errors_of_wear(step)[3]
 
         def solve() -> list[float]:
-            through = table.transmissivities(step.patches.closure_mm, step.slid_mm, cause, wider)
+            through = coupling.model.transmissivities(step, cause, wider)
             return [self._total(through, "xy".index(way)) for way in self._section.directions]
 
         return on_root_alone(self._coupling.comm, solve)

@@ -300,18 +300,14 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         )
         yield "wear", problem, f"coupling.kind = 'concurrent' or 'consistent'; or {_SAMPLES}"
     if scene.by_laws:
-        whole, free = not scene.law.representative, scene.loading.tilt == "free"
-        on_mesh = scene.vibration is not None or scene.coupling.interface == "pointwise"
+        whole, points = not scene.law.representative, scene.coupling.interface == "pointwise"
         out = f"{_OUT}; or coupling.kind = 'concurrent'" if whole else _OUT
         for key, stated, reason in (
             ("accuracy", scene.accuracy is not None, "it is kept of new faces alone"),
             ("a shear", whole and bool(slips), "they do not tell how far single contacts slip"),
             ("loads of the body", whole and scene.loads_bodies, "single cells wear without them"),
-            (
-                "load.tilt = 'free'",
-                whole and free and on_mesh,
-                "how the plane turns is known of patchwise closures, without [vibration], alone",
-            ),
+            ("coupling.interface = 'pointwise'", whole and points, "they wear by patches"),
+            ("vibration", whole and scene.vibration is not None, "they wear on no mesh"),
         ):
             if stated:
                 yield "wear", f"does not go with {key} under laws: {reason}", out

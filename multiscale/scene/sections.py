@@ -597,13 +597,7 @@ class SceneSections:
     def needs_mesh(self) -> bool:
         """Whether more than the pressures of patches moves the body, or its mass counts."""
         other = self.rubs_on_mesh or self.loads_bodies or self.vibration is not None
-        return self.wears_on_mesh or other
-
-    @property
-    def wears_on_mesh(self) -> bool:
-        """Whether laws wear on a mesh: planes that turn freely take the path of laws of patches."""
-        whole = self.law.representative or self.loading.tilt != "free"
-        return self.wear is not None and self.by_laws and whole
+        return other or (self.wear is not None and self.by_laws and self.law.representative)
 
     @property
     def loads_bodies(self) -> bool:

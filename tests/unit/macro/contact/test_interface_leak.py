@@ -14,8 +14,8 @@ from patchlaw.geometry import Control, PatchGrid, Regions, RigidPlane
 from patchlaw.macro import Interface, compat
 from patchlaw.macro.contact.face_leak import LeakingFace, TriangleFace
 from patchlaw.multiscale import LawTable, PatchLaw
-from patchlaw.multiscale.laws.law_table import WornLaws
 from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
+from patchlaw.multiscale.laws.worn_laws import WornLaws
 from patchlaw.support import InputError
 
 LENGTHS = (1.5, 1.0, 1.0)

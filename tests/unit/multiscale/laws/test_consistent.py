@@ -10,7 +10,7 @@ from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthes
 from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale import PatchContact, consistent_laws
 from patchlaw.multiscale.laws.of_patches import WholeSurface
-from patchlaw.multiscale.models.patch_contact import FreePlaneContact
+from patchlaw.multiscale.models.patch_contact import PathContact
 
 MODULUS = 4000.0
 END = 9e-3
@@ -94,7 +94,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
     )  # fmt: skip
     coupling, start = PatchContact(table, compliance), None
     if tilt is None:
-        coupling = FreePlaneContact(table, lambda pressures: pressures @ compliance.T)
+        coupling = PathContact(table, lambda pressures: pressures @ compliance.T)
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)

@@ -105,13 +105,12 @@ def test_a_single_row_is_no_law():
         law_of(hertz, **one)
 
 
-def test_worn_laws_take_closures_beyond_their_end_by_a_thousandth():
+def test_worn_laws_refuse_closures_beyond_their_end():
     laws = RunningInLaws([[law_of(hertz)], [law_of(hertz, end=8e-3)]], np.array([[0.0], [1e-3]]))
     patch, depth = np.zeros(2, np.intp), np.array([0.0, 1e-3])
     ends = np.array([9e-3, 8e-3])
-    found = laws.at(patch, ends * (1.0 + 5e-4), depth)
-    # along the tangent: less than the law itself by a term of second order
-    np.testing.assert_allclose(found.pressure, hertz(ends * (1.0 + 5e-4) - 1e-3), rtol=1e-6)
-    for place, value in ((0, "0.009018"), (1, "0.008016")):
+    found = laws.at(patch, ends * (1.0 + 1e-13), depth)
+    np.testing.assert_allclose(found.pressure, hertz(ends - 1e-3), rtol=1e-6)
+    for place, value in ((0, "0.00900009"), (1, "0.00800008")):
         with pytest.raises(InputError, match=f"{value}.*: closure beyond the end of the law of a"):
-            laws.at(patch[:1], ends[[place]] * (1.0 + 2e-3), depth[[place]])
+            laws.at(patch[:1], ends[[place]] * (1.0 + 1e-5), depth[[place]])

@@ -7,8 +7,8 @@ import pytest
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale import LawTable, PatchLaw, PatchLaws
-from patchlaw.multiscale.laws.law_table import WornLaws
 from patchlaw.multiscale.laws.rows import LawRows, Untouched
+from patchlaw.multiscale.laws.worn_laws import WornLaws
 from patchlaw.support import InputError
 
 

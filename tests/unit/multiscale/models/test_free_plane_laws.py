@@ -10,7 +10,8 @@ from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthes
 from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale import LawTable, PatchLaw, consistent_laws
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.multiscale.models.patch_contact import FreePlaneContact, _worn_share
+from patchlaw.multiscale.laws.worn_laws import worn_share
+from patchlaw.multiscale.models.patch_contact import PathContact
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)
@@ -74,7 +75,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         model, patches, mean_heights=means, largest=Control(force=2.0, tilt=None)
     )
     compliance = influence_matrix(patches) / (np.pi * MODULUS)
-    coupling = FreePlaneContact(table, lambda pressures: pressures @ compliance.T)
+    coupling = PathContact(table, lambda pressures: pressures @ compliance.T)
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
         plane = model.press(control, patches=patches, mean_heights=means).plane
@@ -85,7 +86,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         assert np.abs(step.moment_N_mm).max() < 1e-6 * force
     with pytest.raises(NotConverged, match="LAW_RANGE"):
         coupling.press(Control(force=3.0, tilt=None))
-    other = FreePlaneContact(table, lambda pressures: 6.0 * pressures @ compliance.T)
+    other = PathContact(table, lambda pressures: 6.0 * pressures @ compliance.T)
     with pytest.raises(NotConverged, match=r"the patches at .*make the laws for this block"):
         other.press(Control(force=2.0, tilt=None))
 
@@ -93,8 +94,8 @@ def test_any_partition_turns_as_the_contacts_do(grid):
 def test_laws_of_a_given_tilt_have_no_path():
     patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
     law = PatchLaw(rows=LawRows.none(), first_touch=1.0, initial_separation=1.0)
-    with pytest.raises(ValueError, match="given tilt"):
-        FreePlaneContact(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
+    with pytest.raises(ValueError, match="whole surface"):
+        PathContact(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
 
 
 def test_what_wears_at_a_held_approach_is_cubic_in_the_distance():
@@ -102,13 +103,13 @@ def test_what_wears_at_a_held_approach_is_cubic_in_the_distance():
 
     def share(part, first, last, rate):
         ends = [SimpleNamespace(worn=np.array([x]), at=x) for x in (first, last)]
-        return _worn_share(part, 0.7, ends, lambda one: rate(one.at))
+        return worn_share(part, 0.7, ends, lambda one: rate(one.at))
 
     first, last = 0.4, 1.1
     worn = [1.0 - np.exp(-first), 1.0 - np.exp(-last)]
     for part in (0.0, 0.2, 0.5, 0.9, 1.0):
         ends = [SimpleNamespace(worn=np.array([one])) for one in worn]
-        found = _worn_share(part, last - first, ends, lambda one: 1.0 - one.worn[0])
+        found = worn_share(part, last - first, ends, lambda one: 1.0 - one.worn[0])
         true = (1.0 - np.exp(-first - part * (last - first)) - worn[0]) / (worn[1] - worn[0])
         assert found == pytest.approx(true, abs=1.2e-3)  # h⁴ f⁗ / 384
     assert share(0.37, 0.4, 1.1, lambda _: 1.0) == pytest.approx(0.37, rel=1e-12)
