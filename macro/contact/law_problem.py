@@ -26,7 +26,7 @@ from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
-from patchlaw.macro.contact.face_sliders import FaceSliders
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
@@ -452,7 +452,7 @@ class LawContactProblem:
 
     def first_order_step(
         self, control: Control, lower: LawContactProblem, before: SliderRecord
-    ) -> tuple[float, float, FaceShear]:
+    ) -> tuple[float, float, FaceShear | None]:
         """Return how a load step with friction ends, to first order from the latest guess.
 
         Args:
@@ -471,15 +471,62 @@ class LawContactProblem:
         """
         guess, moved, left, transfer = self._beyond_linear(control, lower)
         transfer.multAdd(lower._moved_from(before, control, left), moved, moved)
-        forces, sliders = self.forces, self._rubbing
-        closure = forces.closure(guess)
-        lines = Lines(closure, forces.pressure(closure), forces.stiffness(closure))
+        closure = self.forces.closure(guess)
         guess.axpy(-1.0, moved)
+        return self._end_on(self._lines_at(closure), guess)
+
+    def step_on_lines(
+        self, control: Control, other: LawContactProblem
+    ) -> tuple[float, float, FaceShear | None]:
+        """Return how a load step ends on fewer unknowns, to first order from where it ended.
+
+        Laws and sliders are lines at the closures and slips of the same samples there.
+
+        Args:
+            control: What the load step prescribes.
+            other: The same problem on more unknowns, at the end of the load step.
+
+        Returns:
+            See `first_order_step`; without friction no shear.
+
+        Raises:
+            NotConverged: When the linear solve fails, or the shear force is not transmitted.
+
+        Note:
+            Collective; one linear solve.
+        """
+        forces, sliders, guess, found, shear = self.forces, self.sliders, self._guess, None, None
+        assert guess is not None
+        forces.prescribe(self._with_pulls(control), self._plane)
+        lines = self._lines_at(other._closure)
         closure = forces.closure_on_lines(self.sampling.displacements(guess), lines)
+        if sliders is not None:
+            slip = other._rubbing.memory.path[:, -1, 1:]
+            found = sliders.at_slip(*lines, slip)
+            along = ShearLines(slip, lines.closure, found.stress, found)
+            shear = sliders.on_lines(along, forces.along(guess), closure)
+        load, residual = guess.duplicate(), guess.duplicate()
+        forces.write_stresses(lines.at(closure), shear, load)
+        self.equilibrium.matrix.mult(guess, residual)
+        residual.axpy(-1.0, load)
+        forces.linearise(lines.stiffness, found)
+        self._preconditioner.update()
+        guess.axpy(-1.0, self._moved_by(residual, _OF_CHANGE)[0])
+        return self._end_on(lines, guess)
+
+    def _lines_at(self, closure: Array) -> Lines:
+        return Lines(closure, self.forces.pressure(closure), self.forces.stiffness(closure))
+
+    def _end_on(self, lines: Lines, at: PETSc.Vec) -> tuple[float, float, FaceShear | None]:
+        """Return approach, force and shear of displacements on laws that are lines."""
+        forces, shear = self.forces, None
+        closure = forces.closure_on_lines(self.sampling.displacements(at), lines)
         pressure = lines.at(closure)
-        pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # as springs touch
-        found = sliders.respond(closure, forces.along(guess), pressed, lines.stiffness)
-        return float(forces.plane[0]), float(forces.loads(pressure)[0]), sliders.step(found)[1]
+        if self.sliders is not None:
+            pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # springs touch
+            found = self.sliders.respond(closure, forces.along(at), pressed, lines.stiffness)
+            shear = self.sliders.step(found)[1]
+        return float(forces.plane[0]), float(forces.loads(pressure)[0]), shear
 
     def _beyond_linear(
         self, control: Control, lower: LawContactProblem

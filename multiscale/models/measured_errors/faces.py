@@ -393,17 +393,22 @@ class LawErrorProbe(SampleProbe):
 
         Args:
             problem: The problem there.
-            same: Whether its meshes are the same. On more unknowns the answer is then that to first
-                order.
+            same: Whether its meshes are the same. On other unknowns the answer is then that to
+                first order.
             nearer: How much nearer the plane is [mm].
         """
-        if self.begins_on(problem, same=same):
+        further = self.begins_on(problem, same=same)
+        if further > 0:
             step = self.control, self.problem, self.response
             return np.array([problem.first_order_force(*step)])
+        if further < 0:
+            return np.array([problem.step_on_lines(self.control, self.problem)[1]])
         return np.array([problem.solve(nearer_by(self.control, nearer)).force])
 
-    def begins_on(self, problem: LawContactProblem, *, same: bool) -> bool:
-        """Let a problem begin where the load step is; tell whether its end follows to first order.
+    def begins_on(self, problem: LawContactProblem, *, same: bool) -> int:
+        """Let a problem begin where the load step is; tell by how many unknowns it has more.
+
+        Where they are others, its end follows to first order; 0 stands for one that is solved.
 
         Args:
             problem: The problem.
@@ -413,10 +418,10 @@ class LawErrorProbe(SampleProbe):
 
         if not same:
             problem.start_from(self.state.patch_pressure)
-            return False
+            return 0
         state = self.control.body_state
         on.start_from_elements(problem, self.state, self.face, state)
-        return bool(problem.face.body.dofs > self.face.body.dofs)
+        return int(problem.face.body.dofs - self.face.body.dofs)
 
 
 def nearer_by(control: Control, distance: float) -> Control:

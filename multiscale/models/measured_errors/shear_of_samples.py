@@ -200,9 +200,12 @@ class LawShearProbe(LawErrorProbe):
         (control,) = parted_path([self.step])
         assert problem.sliders is not None
         problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
-        if self.begins_on(problem, same=same):
+        further = self.begins_on(problem, same=same)
+        if further > 0:
             step = control, self.problem, self.before
             return self._answer_of(*problem.first_order_step(*step))
+        if further < 0:
+            return self._answer_of(*problem.step_on_lines(control, self.problem))
         found = problem.solve(nearer_by(control, nearer))
         return self._answer_of(found.approach, found.force, found.shear)
 
@@ -411,7 +414,10 @@ class LawShearProbe(LawErrorProbe):
         controls = []
         for reached in paths[number]:
             approach = reference - separation_of(law, reached.closure, reference)
-            force = normal.press(Control(approach=approach)).force
+            place = number, sample, approach
+            if place not in self.cells.forces:
+                self.cells.forces[place] = normal.press(Control(approach=approach)).force
+            force = self.cells.forces[place]
             x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
             load = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
             controls.append(Control(force=force, shear=load))
