@@ -59,8 +59,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.law_problem import LawContactProblem
 
 
-_PARTS = 16
-"""Parts of all load steps together that tell the error by the steps, two of each at least."""
+_PARTS = 8
+"""Parts of the first load step that tell the error by the steps; of later ones 4, and then 2."""
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
@@ -250,10 +250,9 @@ class LawShearProbe(LawErrorProbe):
             stress, lost = self.problem.gone_in_parts(parts)
             return stress, float(self._sliders.total(lost[:, None])[0])
 
-        parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
         # of steps that are remembered; without earlier ones whole steps tell no more than parts
-        (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(parts)
-        coarse, lost_coarse = (whole, lost_whole) if parts == 2 else gone(parts // 2)
+        (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(_PARTS)
+        coarse, lost_coarse = gone(_PARTS // 2)
         stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
         lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
         signed = np.sign(fine - whole) * stress
