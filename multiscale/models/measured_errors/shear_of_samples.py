@@ -39,7 +39,7 @@ from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe, nearer_by
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
@@ -193,21 +193,12 @@ class LawShearProbe(LawErrorProbe):
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
-    def answer_on(
-        self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
-    ) -> Array:
-        """Return the answer on another face, where the load step alone is solved again."""
+    def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
+        """Return what the load step prescribed; sliders go on as they did in it."""
         (control,) = parted_path([self.step])
         assert problem.sliders is not None
-        problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
-        further = self.begins_on(problem, same=same)
-        if further > 0:
-            step = control, self.problem, self.before
-            return self._answer_of(*problem.first_order_step(*step))
-        if further < 0:
-            return self._answer_of(*problem.step_on_lines(control, self.problem))
-        found = problem.solve(nearer_by(control, nearer))
-        return self._answer_of(found.approach, found.force, found.shear)
+        problem.sliders.restore(self.before, near=True)
+        return control, self.before
 
     def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
         assert shear is not None
