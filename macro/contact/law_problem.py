@@ -544,7 +544,7 @@ class LawContactProblem:
             load: The load.
         """
         forces, sliders, closure, found = self.forces, self.sliders, self._closure, None
-        memory, known = sliders and sliders.memory, forces.control
+        memory, known = None if sliders is None else sliders.memory, forces.control
         forces.prescribe(self._with_pulls(control), self._plane)
         try:
             if sliders is not None and before is not None:
