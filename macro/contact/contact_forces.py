@@ -263,7 +263,9 @@ class ContactForces(PressedPlane):
             load: Receives the nodal forces [N].
         """
         lines = given.lines
-        if self.sliders is not None:
+        if isinstance(given.shear, ShearLines):
+            self._lines = given.shear
+        elif self.sliders is not None:
             self._lines = self._shear_lines(self.sliders, displacement, given)
         closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
         self.write_stresses(lines.at(closure), self.shear_on_lines(displacement, closure), load)

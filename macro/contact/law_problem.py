@@ -26,11 +26,11 @@ from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
-from patchlaw.macro.contact.face_sliders import FaceSliders
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
-from patchlaw.macro.contact.pressed_plane import Lines
+from patchlaw.macro.contact.pressed_plane import Lines, Prediction
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import from_vertices
@@ -428,40 +428,18 @@ class LawContactProblem:
             changes = np.asarray(closing @ motion[: levers.shape[1]])
             return changes, float(loads[0] @ motion), iterations
 
-    def first_order_force(
-        self, control: Control, lower: LawContactProblem, to: ApproachResponse
-    ) -> float:
-        """Return the force under a plane that stays, to first order from the latest guess [N].
-
-        Without friction operators are symmetric: what linear elements have left moves the force by
-        its product with their response to the approach.
-
-        Args:
-            control: What is prescribed of the plane: its approach.
-            lower: The same problem on linear elements, whose solution the guess is.
-            to: Its response to the approach.
-
-        Note:
-            Collective; a few products with the tangent, no solve.
-        """
-        guess, moved, left, _ = self._beyond_linear(control, lower)
-        forces, sampling = self.forces, self.sampling
-        change = forces.pressure_change(sampling.weight * sampling.displacements(moved))
-        pressure = forces.pressure(forces.closure(guess)) + change
-        return to.moved.dot(left) + float(forces.loads(pressure)[0])
-
     def first_order_step(
-        self, control: Control, lower: LawContactProblem, before: SliderRecord
-    ) -> tuple[float, float, FaceShear]:
-        """Return how a load step with friction ends, to first order from the latest guess.
+        self, control: Control, lower: LawContactProblem, before: SliderRecord | None
+    ) -> tuple[float, float, FaceShear | None]:
+        """Return how a load step ends, to first order from the latest guess.
 
         Args:
             control: What the load step prescribes.
             lower: The same problem on linear elements, whose solution the guess is.
-            before: What load steps before it left behind of friction, on all ranks.
+            before: What load steps before it left behind of friction, on all ranks; None without.
 
         Returns:
-            The approach [mm], the force [N] and the shear.
+            The approach [mm], the force [N] and the shear, None without friction.
 
         Raises:
             NotConverged: When the linear solve fails, or the shear force is not transmitted.
@@ -471,15 +449,56 @@ class LawContactProblem:
         """
         guess, moved, left, transfer = self._beyond_linear(control, lower)
         transfer.multAdd(lower._moved_from(before, control, left), moved, moved)
-        forces, sliders = self.forces, self._rubbing
-        closure = forces.closure(guess)
-        lines = Lines(closure, forces.pressure(closure), forces.stiffness(closure))
+        closure = self.forces.closure(guess)
         guess.axpy(-1.0, moved)
-        closure = forces.closure_on_lines(self.sampling.displacements(guess), lines)
+        return self._end_on(self._lines_at(closure), guess)
+
+    def step_on_lines(
+        self, control: Control, other: LawContactProblem
+    ) -> tuple[float, float, FaceShear | None]:
+        """Return how a load step ends on fewer unknowns, to first order from where it ended.
+
+        Laws and sliders are lines at the closures and slips of the same samples there.
+
+        Args:
+            control: What the load step prescribes.
+            other: The same problem on more unknowns, at the end of the load step.
+
+        Returns:
+            See `first_order_step`.
+
+        Raises:
+            NotConverged: When the linear solve fails, or the shear force is not transmitted.
+
+        Note:
+            Collective; one linear solve.
+        """
+        guess, shear = self._guess, None
+        assert guess is not None
+        self.forces.prescribe(self._with_pulls(control), self._plane)
+        lines, residual = self._lines_at(other._closure), guess.duplicate()
+        if self.sliders is not None:
+            slip = other._rubbing.memory.path[:, -1, 1:]
+            found = self.sliders.at_slip(*lines, slip)
+            shear = ShearLines(slip, lines.closure, found.stress, found)
+        self.equilibrium.linearise(guess, [Prediction(lines, 0.0, shear)], residual)
+        self._preconditioner.update()
+        guess.axpy(-1.0, self._moved_by(residual, _OF_CHANGE)[0])
+        return self._end_on(lines, guess)
+
+    def _lines_at(self, closure: Array) -> Lines:
+        return Lines(closure, self.forces.pressure(closure), self.forces.stiffness(closure))
+
+    def _end_on(self, lines: Lines, at: PETSc.Vec) -> tuple[float, float, FaceShear | None]:
+        """Return approach, force and shear of displacements on laws that are lines."""
+        forces, shear = self.forces, None
+        closure = forces.closure_on_lines(self.sampling.displacements(at), lines)
         pressure = lines.at(closure)
-        pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # as springs touch
-        found = sliders.respond(closure, forces.along(guess), pressed, lines.stiffness)
-        return float(forces.plane[0]), float(forces.loads(pressure)[0]), sliders.step(found)[1]
+        if self.sliders is not None:
+            pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # springs touch
+            found = self.sliders.respond(closure, forces.along(at), pressed, lines.stiffness)
+            shear = self.sliders.step(found)[1]
+        return float(forces.plane[0]), float(forces.loads(pressure)[0]), shear
 
     def _beyond_linear(
         self, control: Control, lower: LawContactProblem
@@ -514,24 +533,29 @@ class LawContactProblem:
         transfer.multTranspose(rest, left)
         return guess, moved, left, transfer
 
-    def _moved_from(self, before: SliderRecord, control: Control, load: PETSc.Vec) -> PETSc.Vec:
+    def _moved_from(
+        self, before: SliderRecord | None, control: Control, load: PETSc.Vec
+    ) -> PETSc.Vec:
         """Return the displacements by a further load at the end of the latest load step.
 
         Args:
-            before: What load steps before it left behind of friction, on all ranks.
+            before: What load steps before it left behind of friction, on all ranks; None without.
             control: What it prescribed.
             load: The load.
         """
-        forces, sliders, closure = self.forces, self._rubbing, self._closure
-        memory, known = sliders.memory, forces.control
+        forces, sliders, closure, found = self.forces, self.sliders, self._closure, None
+        memory, known = None if sliders is None else sliders.memory, forces.control
         forces.prescribe(self._with_pulls(control), self._plane)
-        sliders.restore(before)
         try:
-            at = closure, forces.pressure(closure), forces.stiffness(closure)
-            self._linearised(sliders.at_slip(*at, memory.path[:, -1, 1:]))
+            if sliders is not None and before is not None:
+                at, slip = self._lines_at(closure), sliders.memory.path[:, -1, 1:]
+                sliders.restore(before)
+                found = sliders.at_slip(*at, slip)
+            self._linearised(found)
             return self._moved_by(load, _OF_CHANGE)[0]
         finally:
-            sliders.memory = memory
+            if sliders is not None and memory is not None:
+                sliders.memory = memory
             forces.prescribe(known, self._plane)
 
     def changed_by(self, stresses: Array) -> tuple[float, Array]:

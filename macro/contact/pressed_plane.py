@@ -442,12 +442,13 @@ class Prediction(NamedTuple):
     Attributes:
         lines: Its laws as lines.
         stiffness: Stiffness of the body under all its samples [MPa/mm].
-        shear: Shear stresses, shape (n, d − 1) [MPa]; None without friction.
+        shear: Shear stresses, shape (n, d − 1) [MPa], or the `ShearLines` that they are on; None
+            without friction.
     """
 
     lines: Lines
     stiffness: float
-    shear: Array | None = None
+    shear: Any = None
 
 
 def law_lines(

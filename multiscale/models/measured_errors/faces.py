@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from patchlaw.geometry import Control
-from patchlaw.geometry.sliders import MOST_REMEMBERED
+from patchlaw.geometry.sliders import MOST_REMEMBERED, SliderRecord
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
@@ -47,6 +47,7 @@ from patchlaw.support.readable import Caution
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
@@ -393,30 +394,31 @@ class LawErrorProbe(SampleProbe):
 
         Args:
             problem: The problem there.
-            same: Whether its meshes are the same. On more unknowns the answer is then that to first
-                order.
+            same: Whether its meshes are the same. On other unknowns the answer is then that to
+                first order.
             nearer: How much nearer the plane is [mm].
-        """
-        if self.begins_on(problem, same=same):
-            step = self.control, self.problem, self.response
-            return np.array([problem.first_order_force(*step)])
-        return np.array([problem.solve(nearer_by(self.control, nearer)).force])
-
-    def begins_on(self, problem: LawContactProblem, *, same: bool) -> bool:
-        """Let a problem begin where the load step is; tell whether its end follows to first order.
-
-        Args:
-            problem: The problem.
-            same: Whether its meshes are the same.
         """
         from patchlaw.macro.contact import other_elements as on
 
+        control, before = self.load_step(problem)
         if not same:
             problem.start_from(self.state.patch_pressure)
-            return False
-        state = self.control.body_state
-        on.start_from_elements(problem, self.state, self.face, state)
-        return bool(problem.face.body.dofs > self.face.body.dofs)
+        else:
+            on.start_from_elements(problem, self.state, self.face, control.body_state)
+            more = problem.face.body.dofs - self.face.body.dofs
+            if more > 0:
+                return self._answer_of(*problem.first_order_step(control, self.problem, before))
+            if more < 0:
+                return self._answer_of(*problem.step_on_lines(control, self.problem))
+        found = problem.solve(nearer_by(control, nearer))
+        return self._answer_of(found.approach, found.force, found.shear)
+
+    def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
+        """Return what a problem on another face is solved under, and what was left behind there."""
+        return self.control, None
+
+    def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
+        return np.array([force])
 
 
 def nearer_by(control: Control, distance: float) -> Control:

@@ -63,6 +63,7 @@ class SampleCells:
         told: What the samples of a region tell, and their areas, by their law and its closure.
         ends: By what tells cells from others, the last two ends of paths in shear that were gone on
             them, each with the way to it.
+        forces: Forces of samples at approaches without shear, by region, sample and approach [N].
     """
 
     model: HalfSpaceModel
@@ -70,6 +71,7 @@ class SampleCells:
     has_edges: bool
     told: dict[Hashable, tuple[Array, Array]] = field(default_factory=dict, init=False)
     ends: dict[Hashable, list[tuple[list[Control], Any]]] = field(default_factory=dict, init=False)
+    forces: dict[Hashable, float] = field(default_factory=dict, init=False)
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         """Return the periodic model of a sample, with the slopes of its bodies where they count.

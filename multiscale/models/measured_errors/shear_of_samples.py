@@ -39,7 +39,7 @@ from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe, nearer_by
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
@@ -59,8 +59,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.law_problem import LawContactProblem
 
 
-_PARTS = 16
-"""Parts of all load steps together that tell the error by the steps, two of each at least."""
+_PARTS = 8
+"""Parts of the first load step that tell the error by the steps; of later ones 4, and then 2."""
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
@@ -193,18 +193,12 @@ class LawShearProbe(LawErrorProbe):
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
-    def answer_on(
-        self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
-    ) -> Array:
-        """Return the answer on another face, where the load step alone is solved again."""
+    def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
+        """Return what the load step prescribed; sliders go on as they did in it."""
         (control,) = parted_path([self.step])
         assert problem.sliders is not None
-        problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
-        if self.begins_on(problem, same=same):
-            step = control, self.problem, self.before
-            return self._answer_of(*problem.first_order_step(*step))
-        found = problem.solve(nearer_by(control, nearer))
-        return self._answer_of(found.approach, found.force, found.shear)
+        problem.sliders.restore(self.before, near=True)
+        return control, self.before
 
     def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
         assert shear is not None
@@ -247,10 +241,9 @@ class LawShearProbe(LawErrorProbe):
             stress, lost = self.problem.gone_in_parts(parts)
             return stress, float(self._sliders.total(lost[:, None])[0])
 
-        parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
         # of steps that are remembered; without earlier ones whole steps tell no more than parts
-        (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(parts)
-        coarse, lost_coarse = (whole, lost_whole) if parts == 2 else gone(parts // 2)
+        (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(_PARTS)
+        coarse, lost_coarse = gone(_PARTS // 2)
         stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
         lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
         signed = np.sign(fine - whole) * stress
@@ -411,7 +404,10 @@ class LawShearProbe(LawErrorProbe):
         controls = []
         for reached in paths[number]:
             approach = reference - separation_of(law, reached.closure, reference)
-            force = normal.press(Control(approach=approach)).force
+            place = number, sample, approach
+            if place not in self.cells.forces:
+                self.cells.forces[place] = normal.press(Control(approach=approach)).force
+            force = self.cells.forces[place]
             x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
             load = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
             controls.append(Control(force=force, shear=load))
