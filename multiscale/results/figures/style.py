@@ -328,7 +328,8 @@ def show_unit(axis: Any, text: str, unit: str, values: Any) -> None:
 def logarithmic(axis: Any) -> None:
     """Label a logarithmic axis, by more than powers of ten where these are too few.
 
-    It has no ticks without labels, which took as long to draw as all the rest. Numbers far from 1 are powers of ten, without mathtext, whose parser is slow.
+    It has no ticks without labels, which took as long to draw as all the rest. Numbers far from 1
+    are powers of ten, without mathtext, whose parser is slow.
 
     Args:
         axis: The x or y axis, with its limits.

@@ -68,7 +68,7 @@ def test_logarithmic_axes_say_so_once():
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("pressure [MPa] (log)", "area [%]")
 
 
-@pytest.mark.parametrize("high", [3.0, 50.0, 1e6])
+@pytest.mark.parametrize("high", [3.0, 50.0, 2e3])
 def test_logarithmic_axes_have_no_ticks_without_labels(high):
     axes = style.new_figure(style.ONE_COLUMN, 2.0).add_subplot()
     axes.set(xscale="log", xlim=(1.0, high))
