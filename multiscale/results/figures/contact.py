@@ -178,7 +178,6 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     bins = np.logspace(low, high, int(8 * (high - low)) + 1)
     axes.hist(10.0**exponent, bins, color=style.BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
-    axes.minorticks_off()
     style.logarithmic(axes.xaxis)
     axes.yaxis.get_major_locator().set_params(integer=True)
 

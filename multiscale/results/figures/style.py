@@ -19,7 +19,7 @@ from matplotlib import colormaps, cycler, rc_context, rcParams, rcParamsDefault
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.support import Array
@@ -328,7 +328,8 @@ def show_unit(axis: Any, text: str, unit: str, values: Any) -> None:
 def logarithmic(axis: Any) -> None:
     """Label a logarithmic axis, by more than powers of ten where these are too few.
 
-    Numbers far from 1 are powers of ten, without mathtext, whose parser is slow.
+    It has no ticks without labels, which took as long to draw as all the rest. Numbers far from 1
+    are powers of ten, without mathtext, whose parser is slow.
 
     Args:
         axis: The x or y axis, with its limits.
@@ -342,7 +343,7 @@ def logarithmic(axis: Any) -> None:
     axis.set_major_formatter(
         lambda value, _: power_of_ten(round(math.log10(value))) if far else number(value)
     )
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
 
 
 def literal(text: str) -> str:

@@ -155,7 +155,6 @@ def draw_spectrum(
         axes.loglog(q[ends], density, "--", color=style.VERMILLION, lw=1.1, label="target")
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
-    axes.minorticks_off()  # drawing them takes as long as all the rest
     style.logarithmic(axes.xaxis)
     style.logarithmic(axes.yaxis)
     axes.set_title(f"rms gradient {rough.sdq:.3g}")

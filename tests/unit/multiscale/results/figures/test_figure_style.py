@@ -68,6 +68,15 @@ def test_logarithmic_axes_say_so_once():
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("pressure [MPa] (log)", "area [%]")
 
 
+@pytest.mark.parametrize("high", [3.0, 50.0, 2e3])
+def test_logarithmic_axes_have_no_ticks_without_labels(high):
+    axes = style.new_figure(style.ONE_COLUMN, 2.0).add_subplot()
+    axes.set(xscale="log", xlim=(1.0, high))
+    assert len(axes.get_xticks(minor=True))
+    style.logarithmic(axes.xaxis)
+    assert not len(axes.get_xticks(minor=True)) and len(axes.get_xticks())
+
+
 def test_scripts_draw_in_the_style():
     with rc_context():
         style.use_style()
