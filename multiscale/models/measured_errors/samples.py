@@ -282,11 +282,12 @@ class SampleProbe:
 
 
 def _rounded(law: PatchLaw, closure: float) -> float:
-    """Return the closure of a law at the nearest power of `_ROUNDED` to its pressure [mm]."""
-    if not (pressure := float(law.pressure(closure))):
+    """Return the closure nearest to a law's [mm] with its largest pressure over `_ROUNDED`ⁿ."""
+    pressure, largest = law.pressure(np.array([closure, law.range[1]])).tolist()
+    if not pressure:
         return closure
-    power = _ROUNDED ** round(math.log(pressure, _ROUNDED))
-    return float(closure_under(law, np.array(power)))
+    power = _ROUNDED ** round(math.log(pressure / largest, _ROUNDED))
+    return float(closure_under(law, np.array(largest * power)))
 
 
 def closure_under(law: PatchLaw, pressure: Array) -> Array:

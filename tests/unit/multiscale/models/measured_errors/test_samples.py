@@ -190,6 +190,17 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
 
 
+def test_errors_of_samples_do_not_depend_on_the_unit_of_pressures():
+    def errors(unit):
+        block = {"young_modulus": 4100.0 * unit, "poisson_ratio": 0.17}
+        block |= {"height": 0.8, "lengths": [1.1, 0.9], "cells": [1, 1, 1]}
+        load = {"pressure": 2.3 * unit, "steps": 1}
+        step = run(scene(None, block=block, load=load)).steps[-1]
+        return step.contact_area_fraction_error, step.mean_separation_error_mm
+
+    assert errors(math.pi) == pytest.approx(errors(1.0), rel=1e-5)
+
+
 def test_closures_under_pressures_near_first_touch_are_those_of_the_law():
     """Read off between even places, 1e-9 of the largest pressure led to 3e-12 of it."""
     law = SimpleNamespace(range=(-0.3, 1.1), pressure=lambda closure: 7.0 * (closure + 0.3) ** 1.5)
