@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "verification"))
 
+from helpers.rough_sphere_on_block import forces_on_strips
 from helpers.rough_sphere_oracle import gaussian, rough_sphere
-from test_rough_sphere import forces_on_strips
 
 HEIGHTS = gaussian()
 MESHES = (15, 25, 35)

@@ -164,8 +164,8 @@ FAULTS = [
     # flow, heat
     Fault(
         "micro",
-        "cell_network(turned**3, sides",
-        "cell_network(turned**2, sides",
+        "return cell_network(turned**3, sides",
+        "return cell_network(turned**2, sides",
         "unit/micro/flow/test_gap_flow.py",
     ),
     Fault(

@@ -38,10 +38,11 @@ SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
 
 
 LONGEST = (
-    "house/test_wheel.py", "house/test_demos.py", "parallel/test_scene_bodies.py",
-    "house/test_my_surface.py", "house/test_style.py", "parallel/test_choice_ranks.py",
-    "parallel/test_resume.py", "verification/test_finite_slopes_periodic.py",
-    "parallel/test_four_ranks.py", "parallel/test_memory_ranks.py", "parallel/test_faults.py",
+    "house/test_wheel.py", "house/test_demos.py", "unit/multiscale/test_worn_laws.py",
+    "parallel/test_scene_bodies.py", "house/test_my_surface.py", "house/test_style.py",
+    "parallel/test_choice_ranks.py", "parallel/test_resume.py",
+    "verification/test_finite_slopes_periodic.py", "parallel/test_four_ranks.py",
+    "parallel/test_memory_ranks.py", "parallel/test_faults.py",
 )  # fmt: skip
 """Files of half a minute and more, begun first, so that no worker waits for one at the end."""
 

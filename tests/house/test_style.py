@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.seeded_faults import FAULTS, place
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -46,7 +48,7 @@ def test_scripts_run_by_hand_name_what_there_is(folder):
         subprocess.run(  # options as above, so that what mypy knows of the packages serves here
             [sys.executable, "-m", "mypy", "--explicit-package-bases", *files],
             cwd=ROOT,
-            env=os.environ | {"MYPYPATH": os.pathsep.join(["tests", "tests/verification", folder])},
+            env=os.environ | {"MYPYPATH": os.pathsep.join(["tests", folder])},
             capture_output=True,
             text=True,
             check=False,
@@ -57,6 +59,12 @@ def test_scripts_run_by_hand_name_what_there_is(folder):
     bases = ('"object" has no', '"Coupling" has no')  # what classes derived from them may have
     errors = [line for line in result.stdout.splitlines() if line.endswith(kinds)]
     assert [line for line in errors if not any(base in line for base in bases)] == []
+
+
+def test_lines_of_seeded_faults_stand_once():
+    for fault in FAULTS:
+        place(fault, ROOT)
+        assert all((ROOT / "tests" / test).exists() for test in fault.tests.split()), fault
 
 
 def test_no_merge_is_left_half_done():

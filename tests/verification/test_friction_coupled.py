@@ -11,10 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers import dense_friction
-from scipy.interpolate import RegularGridInterpolator
-from scipy.optimize import brentq
-from scipy.special import ellipk
-from test_calculix_friction import (
+from helpers.sheared_sphere import (
     LOAD,
     MU,
     NU,
@@ -24,7 +21,10 @@ from test_calculix_friction import (
     path,
     sheared_by_interface,
     sphere,
-)
+)  # fmt: skip
+from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import brentq
+from scipy.special import ellipk
 
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, ShearState, Surface
 from patchlaw.micro import FrictionModel, HalfSpaceModel

@@ -2,16 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers.block_cases import block_of
+from helpers.rough_sphere_on_block import forces_on_strips
 from helpers.rough_sphere_oracle import EXPONENTIAL, gaussian, moment, rough_sphere
 from scipy.integrate import quad
 
-from patchlaw.geometry import Control, PatchGrid
-from patchlaw.macro import LawContactProblem, LoadedFace
-
-RADIUS, DEVIATION = 1.0, 2e-4  # R and σ [mm]
-ALONG = np.sqrt(2.0 * RADIUS * DEVIATION)
-PRESSURE = np.sqrt(DEVIATION / (8.0 * RADIUS))  # of E* = 1 MPa
 GAUSSIAN = gaussian()
 
 
@@ -59,52 +53,6 @@ def test_hertz_errs_by_seven_percent_at_most_up_to_a_roughness_of_a_twentieth(mu
     assert 0.02 < found.radius - 1.0 < 0.07
     rougher = rough_sphere(mu, 0.5, GAUSSIAN)
     assert rougher.peak < 0.75 and rougher.radius > 1.2
-
-
-class Summits:
-    """Pressure of asperities on a face, over its closure: a law as any user may write it."""
-
-    def __init__(self, mu, heights):
-        self._mu, self._heights = mu, heights
-
-    def pressure(self, closure):
-        return PRESSURE * self._mu * self._heights.force(6.0 - closure / DEVIATION)
-
-    def stiffness(self, closure):
-        return -PRESSURE * self._mu / DEVIATION * self._heights.slope(6.0 - closure / DEVIATION)
-
-
-def forces_on_strips(mu, alpha, heights, cells, beyond):
-    """Press a crowned block; return what strips of its face carry, and what the oracle says.
-
-    Strips a cell wide, the middle one through the middle of the contact, carry the integrals of the
-    pressure across it: their sum is the force, and the middle one tells ∫ p dρ.
-    """
-    exact = rough_sphere(mu, alpha, heights, beyond=np.sqrt(2.0) * beyond + 1.0)
-    half = exact.hertz + beyond
-    block = block_of(
-        young_modulus=1.0,
-        poisson_ratio=0.0,
-        interface=(2.0 * half * ALONG,) * 2,
-        height=4.0 * half * ALONG,  # the force is prescribed: a few radii are a half-space
-        cells=(cells, cells, cells // 3 + 2),
-        grading=16.0,
-        margin=3.0 * half * ALONG,
-        margin_cells=4,
-        margin_grading=8.0,
-    )
-    strips = PatchGrid(grid=(cells, 1), lengths=block.mesh.shape.interface)
-    pressed = LawContactProblem(
-        LoadedFace.of_block(block, strips),
-        [Summits(mu, heights)] * cells,
-        "pointwise",
-        crown=lambda x, y: ((x - half * ALONG) ** 2 + (y - half * ALONG) ** 2) / (2.0 * RADIUS),
-    )
-    force = exact.load * ALONG**2 * PRESSURE
-    state = pressed.solve(Control(force=force))
-    assert state.force == pytest.approx(force, rel=1e-9)
-    found = state.patch_pressure / PRESSURE * (2.0 * half) ** 2 / cells
-    return found, exact.strips(np.linspace(-half, half, cells + 1), half)
 
 
 def check(found, exact, allowed):

@@ -1,8 +1,12 @@
 """Refinement by bisection: conforming, within bounds of size and shape, with tags inherited."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
+from patchlaw.geometry.meshes import bisection
 from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, reentrant_edges, refined
 from patchlaw.geometry.meshes.block import lattice_cells
 
@@ -87,6 +91,31 @@ def test_tags_are_inherited(small):
     assert areas(mesh, 7).sum() == pytest.approx(1.0, rel=1e-12)
     assert np.all(mesh.points[mesh.facets[mesh.facet_tags == 7], 2] == 1.0)
     assert areas(mesh, -1).sum() == pytest.approx(5.0, rel=1e-12)
+
+
+def test_middles_lie_between_the_corners_that_dolfinx_expects(small):
+    points, cells = bisection.with_middles(small[1])
+    ends = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+    np.testing.assert_array_equal(points[cells[:, 4:]], points[cells[:, ends]].mean(axis=2))
+    assert len(np.unique(cells)) == len(points)
+
+
+def test_with_an_edge_the_longest_of_every_facet_and_cell_with_it_is_divided():
+    """Looked up one by one, on cells of every shape."""
+    random = np.random.default_rng(8)
+    points = random.random((60, 3))
+    cells = np.asarray(Delaunay(points).simplices, dtype=np.int64)
+    edges, of_cell = bisection._edges(cells)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    number = {tuple(edge): k for k, edge in enumerate(edges.tolist())}
+    asked = random.random(len(edges)) < 0.03
+    found = bisection._closed(asked, of_cell, bisection._order(lengths))
+    assert found[asked].all() and not found.all()
+    for cell in np.sort(cells).tolist():
+        for size in (3, 4):
+            for corners in combinations(cell, size):
+                these = [number[pair] for pair in combinations(corners, 2)]
+                assert found[max(these, key=lengths.__getitem__)] or not found[these].any()
 
 
 def test_hexahedra_of_any_form_are_divided_without_gaps():

@@ -15,6 +15,7 @@ from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import ContactCells
 from patchlaw.micro.complementarity import solver
 from patchlaw.micro.complementarity.active_set import solve
+from patchlaw.micro.complementarity.cell_problem import box_around
 
 CASES = {
     "square": ((12, 12), (1.0, 1.0)),
@@ -195,3 +196,23 @@ def test_loads_that_no_pressures_meet():
     problem = contact_problem(np.zeros((8, 8)), (1.0, 1.0), approach((8, 8), 65.0), hardness=1.0)
     with pytest.raises(NotConverged, match=message):
         solve(problem, np.ones((8, 8)))
+
+
+def test_best_motion_is_exact_for_light_cells_too():
+    """Cells that touch without pressure have a weight of 1e-8 of the others."""
+    motions, cells = turning(*map(np.linspace, (-0.7, -0.6), (0.7, 0.6), (9, 8)), 1.0), [3, 60, 29]
+    weights, gap = np.zeros((9, 8)), motions.displacement(np.array([1.0, -0.3, 0.7]))
+    weights.ravel()[cells] = [1.0, 0.8, 1e-8]
+    left = gap - motions.displacement(motions.closing(weights, gap))
+    assert np.abs(left.ravel()[cells]).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "size"), [(3, 3, 6), (90, 99, 12), (0, 99, 100), (10, 41, 32), (40, 88, 64)]
+)
+def test_sides_of_boxes_are_few(first, last, size):
+    cells = np.zeros((100, 7), bool)
+    cells[[first, last], 3] = True
+    rows, columns = box = box_around(cells)
+    assert (rows.stop - rows.start, columns.stop - columns.start) == (size, 6)
+    assert cells[box].sum() == cells.sum() and 0 <= rows.start and rows.stop <= 100

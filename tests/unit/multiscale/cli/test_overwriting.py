@@ -50,13 +50,17 @@ def test_keys_that_are_set_make_folders_of_their_own(scene, capsys):
     }
 
 
-def test_the_same_scene_is_run_again(scene, capsys):
+def test_the_same_scene_is_run_again_until_somebody_changes_its_results(scene, capsys):
     assert main(["run", "scene.toml"]) == 0
     words = ("--out", "results/scene", "--set", "block.young_modulus=4000")
     assert main(["run", "scene.toml", *words]) == 0
     # what is written beside the results makes no other scene of it
     assert main(["run", "scene.toml", "--set", "output.report=true"]) == 0
     assert (scene.parent / "results" / "scene" / "report.html").is_file()
+    changed = scene.parent / "results" / "scene" / "history.csv"
+    changed.write_bytes(changed.read_bytes() + b" ")
+    assert main(["run", "scene.toml"]) == 2
+    assert "holds history.csv, which is no result" in capsys.readouterr().err
 
 
 def test_what_an_earlier_version_did_not_know_is_no_difference(scene):

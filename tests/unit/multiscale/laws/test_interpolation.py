@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
+from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent, _pchip_slopes
 
 RNG = np.random.default_rng(2)
 COMPLIANCE = 1e-5 * (np.eye(12) + 0.05 * RNG.uniform(0.0, 1.0, (12, 12)))
@@ -48,3 +48,12 @@ def test_a_singular_system_is_refused():
     at = law_point(np.ones(2), np.zeros(2), np.zeros(2))
     with pytest.raises(np.linalg.LinAlgError):
         Tangent.of(at, np.zeros((2, 2))).solve(np.ones(2))
+
+
+def test_closures_that_stop_little_by_little_have_no_rigid_end():
+    """Rows of −4^(−x): three rows at the end alone tell a slope of 0, that of a rigid law."""
+    values = -(0.25 ** np.arange(4.0))
+    secant = np.append(np.diff(values), 0.0)[:, None] * np.ones(4)
+    found = _pchip_slopes(np.arange(4.0), secant, np.array([0]), np.array([3]))[-1]
+    exact = np.log(4.0) * 0.25**3
+    assert (0.5 * exact < found).all() and (found < exact).all()

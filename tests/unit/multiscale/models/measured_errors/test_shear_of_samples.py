@@ -6,7 +6,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from patchlaw.multiscale.models.measured_errors import shear_of_samples
 from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
+
+
+def test_paths_on_cells_go_on_from_where_the_load_step_before_has_come(monkeypatch):
+    pressed = []
+
+    def gone(normal, friction, path, before):
+        pressed.extend(path)
+        return (before or "") + "".join(path)
+
+    monkeypatch.setattr(shear_of_samples, "gone", gone)
+    probe = SimpleNamespace(cells=SimpleNamespace(ends={}))
+    paths = "a", "ab", "ac", "acd", "ace", "xce", "xce"
+    ends = [LawShearProbe._gone(probe, "cells", None, None, list(path)) for path in paths]
+    assert ends == list(paths)
+    assert "".join(pressed) == "a" + "b" + "c" + "d" + "e" + "xce"
 
 
 @pytest.mark.parametrize(("before", "there", "error"), [
