@@ -78,7 +78,7 @@ def cell_flows(
         maps = [_links(gap / size * flowing[k], lengths, axes[k], periodic) for k in some]
         links = [np.array(one) for one in zip(*maps, strict=True)]
         maps.clear()
-        solved = potentials(links, tolerance)
+        solved = potentials(links, [axes[k] for k in some], tolerance)
         if solved is None:
             return None
         flows[some] = solved[1] * size**3
@@ -123,7 +123,9 @@ def _links(gap: Array, lengths: tuple[float, float], axis: int, periodic: bool) 
     return found
 
 
-def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | None:
+def potentials(
+    given: list[Array], axes: Sequence[int], tolerance: float
+) -> tuple[Array, Array] | None:
     """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
 
     The flow is the power that the potentials dissipate, whose error is of second order in theirs.
@@ -132,19 +134,24 @@ def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | No
         given: Links of each cell to the next one along x, from the last to the first, the same
             along y, links to the terminal of potential 1 and to that of 0; for n directions of flow
             shape (n, nx, ny) each. 1 is about the largest. Emptied, which frees them.
+        axes: Axis of each direction, 0 for x, whose terminals are at its first and last cells.
         tolerance: Error of the flows that does no harm, relative to them.
 
     Returns:
-        Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
+        Potentials, any where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
     (along_x, along_y, source, sink), kept = _even(given)
     given.clear()
     links = {(1, 0): along_x, (0, 1): along_y}
     diagonal = sum(link + shifted(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
+    start = [
+        _in_series((along_x, along_y)[axis][k], source[k], sink[k], axis)
+        for k, axis in enumerate(axes)
+    ]
     cycle = Cycle(links, diagonal)
     del along_x, along_y, links, diagonal  # which the cycle has as it needs them
-    iteration = _Iteration(cycle, source)
+    iteration = _Iteration(cycle, source, start)
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
     most, worst = _IMBALANCE * np.sqrt(tolerance), list[float]()
     for count in range(_MOST_ITERATIONS):
@@ -159,6 +166,23 @@ def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | No
         if _are_slow(worst) and cycle.with_pools():
             iteration.begins_anew()
     return None
+
+
+def _in_series(links: Array, source: Array, sink: Array, axis: int) -> Array:
+    """Return one potential for each line across the flow, shape (nx, 1) or (1, ny).
+
+    They are those of flows from line to line in series, exact where gaps depend on one axis alone.
+
+    Args:
+        links: Along the axis, those of the last line 0.
+        source: See `potentials`.
+        sink: Likewise.
+        axis: Axis of the flow.
+    """
+    between = links.sum(1 - axis, keepdims=True).take(range(links.shape[axis] - 1), axis)
+    first, last = (np.full((1, 1), each.sum()) for each in (source, sink))
+    drops = np.cumsum(1.0 / np.concatenate((first, between, last), axis), axis)
+    return 1.0 - (drops / drops.max()).take(range(links.shape[axis]), axis)
 
 
 def _are_slow(imbalances: list[float]) -> bool:
@@ -198,7 +222,7 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
 
 
 class _Iteration:
-    """Conjugate gradients for the potentials of every second cell, from 0.
+    """Conjugate gradients for the potentials of every second cell.
 
     The cells between, of the first two parities, have links to these and to terminals alone, and
     their potentials are those that balance them.
@@ -206,6 +230,7 @@ class _Iteration:
     Args:
         cycle: Preconditioner, whose finest grid is the problem.
         source: See `potentials`.
+        start: Potentials to begin from, for each direction, of shapes that extend to (nx, ny).
 
     Attributes:
         flow: Flows that potentials dissipate, to rounding of the sum of all links to the source.
@@ -213,17 +238,26 @@ class _Iteration:
             that adds up over iterations, shape (n,).
     """
 
-    def __init__(self, cycle: Cycle, source: Array) -> None:
+    def __init__(self, cycle: Cycle, source: Array, start: Sequence[Array]) -> None:
         self._cycle, self._grid = cycle, cycle.grids[0]
         shape = self._grid.shape
         self._source = {(i, j): source[:, i::2, j::2] for i, j in PARITIES}
         self._along, self._work = Cells(shape, float), np.empty(shape)
-        self.flow = source.sum(axis=(1, 2))
+        for k, values in enumerate(start):
+            for (i, j), own in self._along.own.items():
+                own[k] = np.broadcast_to(values, source.shape[1:])[i::2, j::2]
+        for one in _SOLVED:
+            self._along.wrap(one)
+        self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
         self._balance(self._source)
-        for one in _BETWEEN:
-            self.flow -= np.einsum("nxy,nxy->n", self._source[one], self._along.own[one])
-        self._residual = {one: self._into(one) + self._source[one] for one in _SOLVED}
-        self._potential = {one: np.zeros(shape) for one in _SOLVED}
+        self._residual, self.flow = {}, source.sum(axis=(1, 2))
+        for one, links in self._source.items():
+            self.flow -= np.einsum("nxy,nxy->n", links, self._along.own[one])
+        for one, own in self._potential.items():
+            self._residual[one] = (
+                self._into(one) + self._source[one] - self._grid.diagonal[one] * own
+            )
+        self.flow -= _product(self._residual, self._potential)
         self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
         self._before, self._changes = np.zeros(len(source)), list[Array]()
 

@@ -255,6 +255,26 @@ def test_flows_stay_within_a_looser_tolerance(monkeypatch):
     assert found[1e-4][0].transmissivity != found[1e-7][0].transmissivity
 
 
+def test_iterations_begin_with_lines_in_series(monkeypatch):
+    """From zero, flows across and along ridges took 21 iterations."""
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 3)
+    ridges = 10.0 ** np.random.default_rng(3).uniform(-1.0, 0.0, 80)
+    gap = np.tile(ridges, (100, 1))
+    for axis, turned in enumerate((gap.T, gap)):
+        found = gap_iteration.cell_flows(turned, (1.0, 1.0), (0, 1), periodic=True)
+        assert found[axis][1] == pytest.approx(1.0 / (ridges**-3.0).mean(), rel=1e-9, abs=0)
+
+
+def test_links_near_zero_do_not_overflow(monkeypatch):
+    """A cross of two channels left coarse cells with links of rounding alone."""
+    monkeypatch.setattr(transport, "_MOST_FACTORISED", 0)
+    gap = np.zeros((17, 16))
+    gap[8], gap[:, 5] = 1.0, 0.5
+    with np.errstate(over="raise"):
+        along_x, along_y = gap_flows(gap, (1.0, 0.7))
+    assert along_x.percolates and along_y.percolates
+
+
 def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
     """What was added to 97 cells took more than twice as many as chains of 15 cells."""
     monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 16)
