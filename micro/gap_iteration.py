@@ -211,6 +211,9 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
     kept: list[Any] = []
     for axis, count in enumerate(links[0].shape[1:], start=1):
         most = count + -count % 2 ** max(halvings, 1)
+        if most == count:
+            kept.append(slice(None))
+            continue
         order = np.arange(most) * count // most
         kept.append(np.diff(order, prepend=-1) > 0)
         times = np.bincount(order)[order]  # links in series in place of one
@@ -250,22 +253,29 @@ class _Iteration:
             self._along.wrap(one)
         self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
         self._balance(self._source)
-        self._residual, self.flow = {}, source.sum(axis=(1, 2))
+        self.flow = source.sum(axis=(1, 2))
         for one, links in self._source.items():
             self.flow -= np.einsum("nxy,nxy->n", links, self._along.own[one])
-        for one, own in self._potential.items():
-            self._residual[one] = (
-                self._into(one) + self._source[one] - self._grid.diagonal[one] * own
-            )
+        self._residual = {one: self._left(one) for one in _SOLVED}
         self.flow -= _product(self._residual, self._potential)
+        self.imbalance = _sum(self._residual)
         self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
         self._before, self._changes = np.zeros(len(source)), list[Array]()
 
     def _into(self, parity: Offset) -> Array:
         """Return what flows into cells of a parity from their neighbours, themselves at 0."""
-        beside, total = self._along.beside[parity], np.zeros(self._grid.shape)
-        for key, link in self._grid.links[parity].items():
+        beside, links = self._along.beside[parity], iter(self._grid.links[parity].items())
+        key, link = next(links)
+        total: Array = link * beside[key]
+        for key, link in links:
             total += np.multiply(link, beside[key], out=self._work)
+        return total
+
+    def _left(self, parity: Offset) -> Array:
+        """Return what potentials leave of the balance of cells of a parity, with sources."""
+        total = self._into(parity)
+        total += self._source[parity]
+        total -= np.multiply(self._grid.diagonal[parity], self._along.own[parity], out=self._work)
         return total
 
     def _balance(self, source: Parts | None = None) -> None:
@@ -284,10 +294,9 @@ class _Iteration:
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along = self._residual, self._along
-        scale = np.max([np.abs(one).max(axis=(1, 2)) for one in residual.values()], axis=0)
-        scale = scale[:, None, None] + np.finfo(float).tiny
+        scale = self.imbalance[:, None, None] + np.finfo(float).tiny
         for one, right in self._right.items():
-            np.divide(residual[one], scale, out=right, casting="same_kind")
+            np.multiply(residual[one], 1.0 / scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
         steps = {one: guess[one] * scale for one in _SOLVED}
         now = _product(residual, steps)
@@ -308,7 +317,7 @@ class _Iteration:
             residual[one] -= np.multiply(out[one], by, out=self._work)
         self._changes.append(length * now)
         self.flow = self.flow - self._changes[-1]
-        self.imbalance = np.sum([np.abs(one).sum(axis=(1, 2)) for one in residual.values()], axis=0)
+        self.imbalance = _sum(residual)
         last = max(2, len(self._changes) // 4)
         return np.asarray(np.sum(self._changes[-last:], axis=0))
 
@@ -339,12 +348,14 @@ class _Iteration:
         for one, source in self._source.items():
             drop = np.subtract(1.0, self._along.own[one], out=self._work)
             flow += np.einsum("nxy,nxy,nxy->n", source, drop, drop)
-        imbalance = np.zeros(len(flow))
-        for one, source in self._source.items():
-            out = grid.diagonal[one] * self._along.own[one] - self._into(one) - source
-            imbalance += np.abs(out).sum(axis=(1, 2))
+        left = {one: self._left(one) for one in PARITIES}
         self._along = along
-        return found, flow, imbalance
+        return found, flow, _sum(left)
+
+
+def _sum(parts: Parts) -> Array:
+    """Return sums of absolute values, shape (n,)."""
+    return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in parts.values()))
 
 
 def _product(first: Parts, second: Parts) -> Array:
