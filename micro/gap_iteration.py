@@ -30,6 +30,10 @@ _MOST_ITERATIONS = 100
 it. With 10⁻⁷ that left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 %
 in contact, and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and
 3 · 10⁻⁵ on a map that took 51 iterations."""
+_MOST_PER_CELL = 0.3
+"""How many of them at most per cell along the shorter side. Factors take as long as half of that.
+Of 48 gaps on 73² to 140² cells both flows took 3.3 s of CPU so, 3.6 s without; of 30 others, whose
+g³ differ by many powers of ten, 2.9 and 5.9 s."""
 _IMBALANCE = 3.0
 """What enters and leaves cells may differ by so many times the root of the tolerance, times the
 flow, then, summed over all of them. The flow errs by as much at most, as potentials lie between
@@ -78,7 +82,7 @@ def cell_flows(
         maps = [_links(gap / size * flowing[k], lengths, axes[k], periodic) for k in some]
         links = [np.array(one) for one in zip(*maps, strict=True)]
         maps.clear()
-        solved = potentials(links, tolerance)
+        solved = potentials(links, [axes[k] for k in some], tolerance)
         if solved is None:
             return None
         flows[some] = solved[1] * size**3
@@ -123,7 +127,9 @@ def _links(gap: Array, lengths: tuple[float, float], axis: int, periodic: bool) 
     return found
 
 
-def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | None:
+def potentials(
+    given: list[Array], axes: Sequence[int], tolerance: float
+) -> tuple[Array, Array] | None:
     """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
 
     The flow is the power that the potentials dissipate, whose error is of second order in theirs.
@@ -132,22 +138,27 @@ def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | No
         given: Links of each cell to the next one along x, from the last to the first, the same
             along y, links to the terminal of potential 1 and to that of 0; for n directions of flow
             shape (n, nx, ny) each. 1 is about the largest. Emptied, which frees them.
+        axes: Axis of each direction, 0 for x, whose terminals are at its first and last cells.
         tolerance: Error of the flows that does no harm, relative to them.
 
     Returns:
-        Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
+        Potentials, any where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
     (along_x, along_y, source, sink), kept = _even(given)
     given.clear()
     links = {(1, 0): along_x, (0, 1): along_y}
     diagonal = sum(link + shifted(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
+    start = [
+        _in_series((along_x, along_y)[axis][k], source[k], sink[k], axis)
+        for k, axis in enumerate(axes)
+    ]
     cycle = Cycle(links, diagonal)
     del along_x, along_y, links, diagonal  # which the cycle has as it needs them
-    iteration = _Iteration(cycle, source)
+    iteration = _Iteration(cycle, source, start)
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
     most, worst = _IMBALANCE * np.sqrt(tolerance), list[float]()
-    for count in range(_MOST_ITERATIONS):
+    for count in range(min(_MOST_ITERATIONS, int(_MOST_PER_CELL * min(source.shape[1:])))):
         changes = iteration.step()
         left = np.maximum(changes / tolerance, iteration.imbalance / most)
         if count and (left <= np.maximum(iteration.flow, least)).all():
@@ -159,6 +170,23 @@ def potentials(given: list[Array], tolerance: float) -> tuple[Array, Array] | No
         if _are_slow(worst) and cycle.with_pools():
             iteration.begins_anew()
     return None
+
+
+def _in_series(links: Array, source: Array, sink: Array, axis: int) -> Array:
+    """Return one potential for each line across the flow, shape (nx, 1) or (1, ny).
+
+    They are those of flows from line to line in series, exact where gaps depend on one axis alone.
+
+    Args:
+        links: Along the axis, those of the last line 0.
+        source: See `potentials`.
+        sink: Likewise.
+        axis: Axis of the flow.
+    """
+    between = links.sum(1 - axis, keepdims=True).take(range(links.shape[axis] - 1), axis)
+    first, last = (np.full((1, 1), each.sum()) for each in (source, sink))
+    drops = np.cumsum(1.0 / np.concatenate((first, between, last), axis), axis)
+    return 1.0 - (drops / drops.max()).take(range(links.shape[axis]), axis)
 
 
 def _are_slow(imbalances: list[float]) -> bool:
@@ -187,6 +215,9 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
     kept: list[Any] = []
     for axis, count in enumerate(links[0].shape[1:], start=1):
         most = count + -count % 2 ** max(halvings, 1)
+        if most == count:
+            kept.append(slice(None))
+            continue
         order = np.arange(most) * count // most
         kept.append(np.diff(order, prepend=-1) > 0)
         times = np.bincount(order)[order]  # links in series in place of one
@@ -198,7 +229,7 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
 
 
 class _Iteration:
-    """Conjugate gradients for the potentials of every second cell, from 0.
+    """Conjugate gradients for the potentials of every second cell.
 
     The cells between, of the first two parities, have links to these and to terminals alone, and
     their potentials are those that balance them.
@@ -206,6 +237,7 @@ class _Iteration:
     Args:
         cycle: Preconditioner, whose finest grid is the problem.
         source: See `potentials`.
+        start: Potentials to begin from, for each direction, of shapes that extend to (nx, ny).
 
     Attributes:
         flow: Flows that potentials dissipate, to rounding of the sum of all links to the source.
@@ -213,25 +245,41 @@ class _Iteration:
             that adds up over iterations, shape (n,).
     """
 
-    def __init__(self, cycle: Cycle, source: Array) -> None:
+    def __init__(self, cycle: Cycle, source: Array, start: Sequence[Array]) -> None:
         self._cycle, self._grid = cycle, cycle.grids[0]
         shape = self._grid.shape
         self._source = {(i, j): source[:, i::2, j::2] for i, j in PARITIES}
         self._along, self._work = Cells(shape, float), np.empty(shape)
-        self.flow = source.sum(axis=(1, 2))
+        for k, values in enumerate(start):
+            for (i, j), own in self._along.own.items():
+                own[k] = np.broadcast_to(values, source.shape[1:])[i::2, j::2]
+        for one in _SOLVED:
+            self._along.wrap(one)
+        self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
         self._balance(self._source)
-        for one in _BETWEEN:
-            self.flow -= np.einsum("nxy,nxy->n", self._source[one], self._along.own[one])
-        self._residual = {one: self._into(one) + self._source[one] for one in _SOLVED}
-        self._potential = {one: np.zeros(shape) for one in _SOLVED}
+        self.flow = source.sum(axis=(1, 2))
+        for one, links in self._source.items():
+            self.flow -= np.einsum("nxy,nxy->n", links, self._along.own[one])
+        self._residual = {one: self._left(one) for one in _SOLVED}
+        self.flow -= _product(self._residual, self._potential)
+        self.imbalance = _sum(self._residual)
         self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
         self._before, self._changes = np.zeros(len(source)), list[Array]()
 
     def _into(self, parity: Offset) -> Array:
         """Return what flows into cells of a parity from their neighbours, themselves at 0."""
-        beside, total = self._along.beside[parity], np.zeros(self._grid.shape)
-        for key, link in self._grid.links[parity].items():
+        beside, links = self._along.beside[parity], iter(self._grid.links[parity].items())
+        key, link = next(links)
+        total: Array = link * beside[key]
+        for key, link in links:
             total += np.multiply(link, beside[key], out=self._work)
+        return total
+
+    def _left(self, parity: Offset) -> Array:
+        """Return what potentials leave of the balance of cells of a parity, with sources."""
+        total = self._into(parity)
+        total += self._source[parity]
+        total -= np.multiply(self._grid.diagonal[parity], self._along.own[parity], out=self._work)
         return total
 
     def _balance(self, source: Parts | None = None) -> None:
@@ -250,10 +298,9 @@ class _Iteration:
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along = self._residual, self._along
-        scale = np.max([np.abs(one).max(axis=(1, 2)) for one in residual.values()], axis=0)
-        scale = scale[:, None, None] + np.finfo(float).tiny
+        scale = self.imbalance[:, None, None] + np.finfo(float).tiny
         for one, right in self._right.items():
-            np.divide(residual[one], scale, out=right, casting="same_kind")
+            np.multiply(residual[one], 1.0 / scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
         steps = {one: guess[one] * scale for one in _SOLVED}
         now = _product(residual, steps)
@@ -274,7 +321,7 @@ class _Iteration:
             residual[one] -= np.multiply(out[one], by, out=self._work)
         self._changes.append(length * now)
         self.flow = self.flow - self._changes[-1]
-        self.imbalance = np.sum([np.abs(one).sum(axis=(1, 2)) for one in residual.values()], axis=0)
+        self.imbalance = _sum(residual)
         last = max(2, len(self._changes) // 4)
         return np.asarray(np.sum(self._changes[-last:], axis=0))
 
@@ -305,12 +352,14 @@ class _Iteration:
         for one, source in self._source.items():
             drop = np.subtract(1.0, self._along.own[one], out=self._work)
             flow += np.einsum("nxy,nxy,nxy->n", source, drop, drop)
-        imbalance = np.zeros(len(flow))
-        for one, source in self._source.items():
-            out = grid.diagonal[one] * self._along.own[one] - self._into(one) - source
-            imbalance += np.abs(out).sum(axis=(1, 2))
+        left = {one: self._left(one) for one in PARITIES}
         self._along = along
-        return found, flow, imbalance
+        return found, flow, _sum(left)
+
+
+def _sum(parts: Parts) -> Array:
+    """Return sums of absolute values, shape (n,)."""
+    return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in parts.values()))
 
 
 def _product(first: Parts, second: Parts) -> Array:

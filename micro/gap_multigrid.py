@@ -47,8 +47,9 @@ COARSEST = 8
 _WITH_POOLS = 2
 """Number of the grid, 0 for the finest, whose pools are corrected besides. Smaller pools have cells
 of their own until there; larger ones took 22 iterations in place of 18 where it was the third."""
-_LEAST = 1e-30
-"""Sum of a cell's links, over the largest link, below which it counts as closed."""
+_LEAST = 1e-26
+"""Sum of a cell's links, over the largest link, below which it counts as closed: single precision
+holds what `_inverse` makes of it."""
 
 
 def shifted(values: NDArray[Any], offset: Offset) -> NDArray[Any]:

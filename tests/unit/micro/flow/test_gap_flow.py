@@ -159,7 +159,8 @@ def channels(shape, seed, closed):
 
 
 def both(gap, monkeypatch, **options):
-    """Return flows by multigrid and by a factorisation."""
+    """Return flows by multigrid, even where factors took less, and by a factorisation."""
+    monkeypatch.setattr(gap_iteration, "_MOST_PER_CELL", 9.0)
     found = []
     for most in (0, gap.size):
         monkeypatch.setattr(transport, "_MOST_FACTORISED", most)
@@ -206,6 +207,14 @@ def test_what_does_not_converge_is_factorised(monkeypatch):
     monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 3)
     for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
         assert one.transmissivity == other.transmissivity
+
+
+def test_small_maps_take_few_iterations(monkeypatch):
+    """Factors take less."""
+    gap = channels((50, 50), 36, 0.34)
+    assert gap_iteration.cell_flows(gap, (1.0, 1.0), (0,), periodic=True) is None
+    monkeypatch.setattr(gap_iteration, "_MOST_PER_CELL", 9.0)
+    assert gap_iteration.cell_flows(gap, (1.0, 1.0), (0,), periodic=True) is not None
 
 
 def test_iterations_that_stand_still_are_no_solution():
@@ -255,6 +264,26 @@ def test_flows_stay_within_a_looser_tolerance(monkeypatch):
     assert found[1e-4][0].transmissivity != found[1e-7][0].transmissivity
 
 
+def test_iterations_begin_with_lines_in_series(monkeypatch):
+    """From zero, flows across and along ridges took 21 iterations."""
+    monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 3)
+    ridges = 10.0 ** np.random.default_rng(3).uniform(-1.0, 0.0, 80)
+    gap = np.tile(ridges, (100, 1))
+    for axis, turned in enumerate((gap.T, gap)):
+        found = gap_iteration.cell_flows(turned, (1.0, 1.0), (0, 1), periodic=True)
+        assert found[axis][1] == pytest.approx(1.0 / (ridges**-3.0).mean(), rel=1e-9, abs=0)
+
+
+def test_links_near_zero_do_not_overflow(monkeypatch):
+    """A cross of two channels left coarse cells with links of rounding alone."""
+    monkeypatch.setattr(transport, "_MOST_FACTORISED", 0)
+    gap = np.zeros((17, 16))
+    gap[8], gap[:, 5] = 1.0, 0.5
+    with np.errstate(over="raise"):
+        along_x, along_y = gap_flows(gap, (1.0, 0.7))
+    assert along_x.percolates and along_y.percolates
+
+
 def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
     """What was added to 97 cells took more than twice as many as chains of 15 cells."""
     monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 16)
@@ -266,6 +295,7 @@ def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
 def test_pools_behind_narrow_links_take_no_more_iterations(monkeypatch):
     """Where coarser grids alone stood for pools, these took 53."""
     monkeypatch.setattr(gap_iteration, "_MOST_ITERATIONS", 40)
+    monkeypatch.setattr(gap_iteration, "_MOST_PER_CELL", 9.0)
     random, pitch, count = np.random.default_rng(2), 13, 8
     gap, inside = np.zeros(2 * [pitch * count]), np.arange(pitch * count) % pitch < pitch - 1
     gap[np.ix_(inside, inside)] = random.uniform(0.5, 1.0, 2 * [inside.sum()])
