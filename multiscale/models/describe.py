@@ -82,13 +82,10 @@ def contact(parts: SceneParts) -> str:
     if parts.summits is not None:
         within = f"{int(parts.interfering_summits.sum())} within the largest approach"
         return f"{len(parts.summits)} summits, {within}; the others cost nothing"
-    heights = parts.surface.heights.size
     count = math.prod(parts.cells or parts.surface.grid)
     if parts.plane_at_largest_load is None:
         return f"{count} cells"
-    near = int((parts.cell_interference > 0.0).sum())
-    which = str(near) if count == heights else f"{near} of {heights} heights"
-    return f"{count} cells, {which} within the largest approach"
+    return f"{count} cells, {parts.interfering_cells} within the largest approach"
 
 
 def gathered(parts: SceneParts) -> str:

@@ -54,8 +54,8 @@ class PatchContact(LawModel):
         """Solve one load step; see `Model.press`."""
         patches, end = self.table.grid, self._laws.end
         state = equilibrium(self._laws, self._compliance, patches, control, self._last)
-        worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
-        if state.local[worst] > end[worst] * (1.0 + ROUNDING):
+        worst = int(np.argmax(state.local - end))
+        if state.local[worst] > end[worst] + ROUNDING * np.abs(end).max():  # ends may be negative
             problem = (
                 f"patch {patches.unravel(worst)} at a local approach of {state.local[worst]:.6g} "
                 f"mm (allowed: up to {end[worst]:.6g} mm)"

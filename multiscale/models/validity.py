@@ -91,7 +91,7 @@ def _of_contact(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the contact and of its micro model."""
     if parts.plane_at_largest_load is not None and not parts.samples:
         of_cells = parts.cells is not None and not parts.scene.by_laws
-        if not (parts.largest_interference > 0.0 if of_cells else parts.interfering_patches):
+        if not (parts.interfering_cells if of_cells else parts.interfering_patches):
             yield "nothing lies within the largest approach: no force will act"
     if (summits := parts.summits) is None:
         return

@@ -316,11 +316,11 @@ class SceneParts:
         """
         return self.plane.at(x, y) - (self.surface.highest - z)
 
-    @property
-    def cell_interference(self) -> Array:
-        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
-        surface = self.surface
-        return self.interference(surface.x[:, None], surface.y, surface.heights)
+    @cached_property
+    def interfering_cells(self) -> int:
+        """Number of cells of contact problems, else of heights, with a positive interference."""
+        surface = self.micro.surface if self.cells else self.surface  # type: ignore[union-attr]
+        return int(np.sum(self._interference(surface) > 0.0))
 
     @cached_property
     def largest_interference(self) -> float:
@@ -329,7 +329,11 @@ class SceneParts:
         Under a tilted plane the approach at the middle may be negative while its lower side
         touches.
         """
-        return max(self.plane.approach, float(self.cell_interference.max()))
+        return max(self.plane.approach, float(self._interference(self.surface).max()))
+
+    def _interference(self, surface: Surface) -> Array:
+        """Return the interference of the heights of a surface, shape (nx, ny) [mm]."""
+        return self.interference(surface.x[:, None], surface.y, surface.heights)
 
     @property
     def interfering_summits(self) -> Flags:

@@ -43,14 +43,23 @@ def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
     assert run(asked).force_N[-1] == pytest.approx(5e-3, rel=1e-9)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 1e-5])  # patches on one side lie beyond the plane
 @pytest.mark.parametrize("coupling", ["isolated", "consistent", "concurrent"])
-def test_plane_that_does_not_touch_carries_nothing(coupling):
-    asked = scene(coupling=coupling, approach=1e-6)
-    assert (
-        make_setup(asked).parts.micro.first_touch > 1e-5
-    )  # cells miss the interpolant's highest point
+def test_plane_that_does_not_touch_carries_nothing(coupling, tilt):
+    asked = scene(coupling=coupling, approach=1e-6, tilt=[tilt, 0.0])
+    setup = make_setup(asked)
+    assert setup.parts.micro.first_touch > 1e-5  # cells miss the interpolant's highest point
+    assert any("nothing lies within" in text for text in setup.about.warnings())
     history = run(asked)
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
+
+
+def test_cells_of_contacts_tell_what_lies_within_an_approach():
+    asked = scene(coupling="concurrent", approach="2 um")
+    for cells, touches in ((33, True), (4, False)):
+        setup = make_setup(asked.with_({"micro.cells": [cells, cells]}))
+        assert bool(setup.parts.interfering_cells) == touches
+        assert any("nothing lies" in text for text in setup.about.warnings()) != touches
 
 
 @pytest.mark.parametrize(("tilt", "coupling", "load"), [
