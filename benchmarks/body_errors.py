@@ -52,7 +52,7 @@ from patchlaw.macro.contact.other_elements import refined_body
 from patchlaw.macro.mesh.from_file import refined
 from patchlaw.micro import BodyModes, TractionModes
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.bodies import mesh as body_mesh
+from patchlaw.multiscale.bodies import face_terms
 from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
 
 COMM = MPI.COMM_WORLD
@@ -121,7 +121,7 @@ def of_contact(seed, cells, folder):
 
 def contacts(choice):
     """Compare stated and true errors by the elements of contacts on bodies of few cells."""
-    body_mesh._modes = lambda around, lengths, side_term: 6
+    face_terms._modes = lambda around, lengths, side_term: 6
     BodyModes.fewer = TractionModes.fewer = lambda self, count: self
     ratios, seed = [], choice.first - 1
     with tempfile.TemporaryDirectory() as folder:
