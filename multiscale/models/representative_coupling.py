@@ -112,7 +112,7 @@ class RepresentativeCoupling(Coupling):
         """Yield what measuring errors needs memory for."""
         if not self.about.unmeasured():
             bodies = {"body": self.parts.body, "counter_body": self.parts.counter}
-            yield from check_requests(bodies)
+            yield from check_requests(bodies, rubs=self.scene.rubs_on_mesh)
 
     # --- errors
 

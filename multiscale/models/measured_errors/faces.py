@@ -69,6 +69,9 @@ degree of elements resolves on the same mesh."""
 _TOLD = 0.57
 """Memory of the products that tell the error of linear elements over that of a solve: 1230 of 2150
 B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
+_OF_FACE_NODE = 30_000.0
+"""Memory of two ways of sliders that load steps in parts have come, for each node of the face [B]:
+up to 9 samples, with 60 springs in two directions and some 20 load steps each."""
 _MOVED = 2.0
 """Errors of area, gap and stiffness under the force over that of the force at the approach,
 relative, where elements and points move pressures about: up to 1.6 on a tilted slab of four
@@ -443,12 +446,21 @@ def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     return [cause for cause in CAUSES if several or cause != "samples"]
 
 
-def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
+def check_requests(
+    bodies: Mapping[str, BodyFacts | None], *, rubs: bool = False
+) -> Iterator[MemoryRequest]:
     """Yield the memory that measuring the errors of a load step takes beside that of the run.
 
     Args:
         bodies: What is known of the bodies, by their section of the scene.
+        rubs: Whether their faces are sheared with friction.
     """
+    if rubs:  # nodes lie as far apart along the face as below it
+        known = [body for body in bodies.values() if body]
+        layers = [(b.unknowns / 3.0 * b.depth**2 / b.area) ** (1.0 / 3.0) for b in known]
+        nodes = sum(b.unknowns / 3.0 / max(n, 1.0) for b, n in zip(known, layers, strict=True))
+        purpose = "load steps in parts, which tell the error of the shear (output.check),"
+        yield MemoryRequest(key="output.check", purpose=purpose, shared=_OF_FACE_NODE * nodes)
     raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
     if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
         return

@@ -59,8 +59,9 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.law_problem import LawContactProblem
 
 
-_PARTS = 8
-"""Parts of the first load step that tell the error by the steps; of later ones 4, and then 2."""
+_PARTS, _HALVED = 8, 4
+"""Parts of the first load step that tell the error by the steps, of later ones 4, and then 2; load
+steps up to which half as many tell what the last halving changes; of more all does."""
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
@@ -243,7 +244,8 @@ class LawShearProbe(LawErrorProbe):
 
         # of steps that are remembered; without earlier ones whole steps tell no more than parts
         (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(_PARTS)
-        coarse, lost_coarse = gone(_PARTS // 2)
+        few = self._sliders.memory.path.shape[1] <= _HALVED
+        coarse, lost_coarse = gone(_PARTS // 2) if few else (whole, lost_whole)
         stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
         lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
         signed = np.sign(fine - whole) * stress

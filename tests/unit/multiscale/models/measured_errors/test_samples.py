@@ -335,6 +335,10 @@ def test_the_error_of_linear_elements_takes_memory_and_that_of_quadratic_ones_no
     )
     assert [one.key for one in check_requests(linear)] == ["output.check"]
     assert not list(check_requests(quadratic))
+    (of_sliders,) = check_requests(quadratic, rubs=True)
+    on_face = math.prod(2 * len(one) - 1 for one in TICKS[:2])
+    # nodes are taken to lie as far apart along the face as below it
+    assert of_sliders.shared == pytest.approx(30e3 * on_face, rel=0.5)
 
 
 SHIFTED = {"force": "5.3 N", "steps": 1, "shear": [["0.2 um", "0.1 um"]], "shear_steps": 2}
