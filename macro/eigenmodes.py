@@ -23,6 +23,8 @@ _SHIFT = 1e-8
 """Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
 body has an inverse; bodies of 100 cells have their first mode at 1e-4. What is left of a mode is
 compared with this part of the forces of its single nodes where its own forces are less."""
+_OF_LEAST = 1e-2
+"""Largest shift over the smallest eigenvalue of single unknowns, which the first mode is below."""
 _ROUNDING = 1e-12
 """Squared frequency of a mode over the one that its nodes would have alone, and skew over symmetric
 part of a matrix, which are zeros."""
@@ -43,6 +45,7 @@ _ROOM = 5
 """Vectors that are kept over those of a step: 4 took a fifth more cycles on a cube, and 6 saved a
 twentieth."""
 _MOST_STEPS = 300
+_MOST_STARTS = 4
 _NEW, _COPY = 0.5, 1e-10
 """Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
 among new ones that counts as a combination of the others."""
@@ -134,11 +137,10 @@ def modes_of(
         start: Vectors near the modes, as those of another load, shape (m, k); None: not known.
     """
     compat.collect_garbage(free.comm)
-    unknowns = round(free.sum())
-    if count > unknowns:
-        allowed = f"up to {unknowns}, the free unknowns"
-        raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
+    if count > problem.unknowns:
+        allowed = f"up to {problem.unknowns}, the free unknowns with a mass"
+        raise InputError("there are not as many modes", value=count, allowed=allowed)
     inverse, own = problem.factors() if correct is None else correct, problem.own[:, None]
 
     def corrected(columns: Array) -> Array:
@@ -166,7 +168,7 @@ class _Problem:
     """K and M, without what is held, and which unknowns are free, of all and of this rank's own."""
 
     def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat, free: PETSc.Vec) -> None:
-        self.comm, self.unknowns = free.comm.tompi4py(), round(free.sum())
+        self.comm = free.comm.tompi4py()
         self.own = own = free.array_r > 0.0
         both = stiffness, mass
         if any(one.getSizes() != stiffness.getSizes() or not one.isAssembled() for one in both):
@@ -175,10 +177,13 @@ class _Problem:
         for one in (self.stiffness, self.mass):
             one.diagonalScale(free, free)
         diagonal, weight = self.stiffness.getDiagonal(), self.mass.getDiagonal().array_r[own]
-        ratios = diagonal.array_r[own] / np.where(weight > 0.0, weight, np.inf)
+        heavy = weight > 0.0
+        ratios = diagonal.array_r[own][heavy] / weight[heavy]
+        self.unknowns = self.comm.allreduce(int(heavy.sum()))
         self.largest = self._largest(ratios)
         if not self.largest > 0.0:
             raise InputError("the stiffness has no positive diagonal, or the mass has none")
+        self.least = 1.0 / self._largest(1.0 / ratios[ratios > 0.0])
         diagonal.array[~own] = self._largest(diagonal.array_r)  # what is held has no mass
         self.stiffness.setDiagonal(diagonal)
         self.diagonal = diagonal.array_r
@@ -190,7 +195,8 @@ class _Problem:
         """Return those of K + c M with a small c, as the stiffness of free bodies has none."""
         shifted = self.stiffness.copy()
         structure = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
-        shifted.axpy(_SHIFT * self.largest, self.mass, structure)
+        low, high = _ROUNDING * self.largest, _SHIFT * self.largest
+        shifted.axpy(float(np.clip(_OF_LEAST * self.least, low, high)), self.mass, structure)
         return Factors(shifted, symmetric=self.symmetric)
 
     def modes(self, basis: Array) -> NaturalModes:
@@ -276,8 +282,11 @@ class _Span:
         lost = (again**2).sum(axis=1)
         return rows, np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
 
-    def extend(self, rows: Array) -> None:
-        """Take vectors beside the span, shape (k, m), as far as they are no copies."""
+    def extend(self, rows: Array, sizes: Array) -> None:
+        """Take what `beside` returned, as far as it is neither rounding nor copies."""
+        if not sizes.any():
+            return
+        rows = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
         momenta = products(self._problem.mass, rows.T).T
         for _ in range(2):  # vectors that are nearly copies leave 1e-6 of one another at first
             weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
@@ -306,7 +315,7 @@ class _Span:
     def modes(self, count: int, most: int) -> tuple[Array, int]:
         """Return the shares of the vectors in modes by rising |κ|, and how many are wanted.
 
-        Of a complex pair, both of which count, they are those of the real and the imaginary part.
+        They are orthonormal, the first k of them spanning k modes; of a complex pair both count.
         """
         small = self._small
         values, shares = (
@@ -316,18 +325,21 @@ class _Span:
         )
         order = np.argsort(abs(values), kind="stable")
         values, shares = values[order], shares[:, order]
+        shares = np.where(values.imag < 0.0, shares.imag, shares.real)
+        if not self._problem.symmetric:  # modes about to merge are nearly parallel
+            shares, _ = np.linalg.qr(shares)
         ends = [min(size, len(values)) for size in (count, most)]
         wanted, kept = (end + int(values[end - 1].imag > 0.0) for end in ends)
-        return np.where(values.imag < 0.0, shares.imag, shares.real)[:, :kept], wanted
+        return shares[:, :kept], wanted
 
     def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags]:
         """Return what modes leave of their equations, and whether that is no rounding.
 
         Args:
-            shares: Those of all modes, which span what both parts of a pair do.
+            shares: Those of all modes, see `modes`.
             chosen: The modes that are asked for.
         """
-        along = np.linalg.lstsq(shares, self._small @ shares, rcond=None)[0][:, chosen]
+        along = shares.T @ self._small @ shares[:, chosen]
         mine, (vectors, momenta, forces) = shares[:, chosen].T, self._parts
         left = mine @ forces - (shares @ along).T @ momenta
         sizes = left, (mine @ vectors) * self._problem.diagonal
@@ -364,15 +376,9 @@ def _lowest(
         Collective.
     """
     block = count + _BESIDE
-    first = _first(problem, block, correct, start)
-    span = _Span(problem, _ROOM * block + first.shape[1])
-    errors, past, (rows, sizes) = np.ones(0), np.zeros((0, 0)), span.beside(first)
-    if not (sizes > 0.0).all():
-        reason = "the preconditioner returns zeros, or what is no number"
-        raise _not_found(reason, "see that it is near the inverse of the stiffness")
+    span = _started(problem, block, correct, start)
+    errors, past = np.ones(0), np.zeros((0, 0))
     for _ in range(_MOST_STEPS):
-        if sizes.any():
-            span.extend(rows[sizes > 0.0] / sizes[sizes > 0.0, None])
         shares, wanted = span.modes(count, block)
         limits = np.where(np.arange(min(wanted + 1, shares.shape[1])) < wanted, _ACCURATE, _NEXT)
         if len(errors) != len(limits) or (errors < limits).all():
@@ -381,25 +387,40 @@ def _lowest(
         left, is_some = span.residuals(shares, asked)
         rows, sizes = span.beside(correct(left))  # in the span modes are the best ones
         errors[asked] = np.where(is_some, sizes, 0.0)
-        converged = len(asked) == len(limits) and (errors < limits).all()
-        if converged or len(span) == problem.unknowns:
+        known = len(asked) == len(limits) > wanted and (errors < limits).all()
+        if known or len(span) == problem.unknowns:
             return span.combined(shares[:, :wanted])
         further = (errors >= limits)[asked]
         rows, sizes = rows[further], sizes[further]
         if len(span) + len(rows) > _ROOM * block:
             shares = span.restart(shares, past)
+        span.extend(rows, sizes)
         past = shares
     done = f"{int((errors[:count] < _ACCURATE).sum())} of {count} modes"
     raise _not_found(done, f"ask for fewer modes; {_SEE}", _MOST_STEPS)
 
 
-def _first(problem: _Problem, block: int, correct: Corrections, start: Array | None) -> Array:
-    """Return vectors that the span starts from: given ones, and corrected random ones."""
-    own, rank = problem.own[:, None], problem.comm.rank
+def _started(problem: _Problem, block: int, correct: Corrections, start: Array | None) -> _Span:
+    """Return the span of given vectors, and of corrected random ones.
+
+    Rigid motions grow so much in a correction that they leave only rounding of others, which then
+    come from random momenta without their part. What has no mass follows momenta.
+    """
+    own, draw = problem.own[:, None], np.random.default_rng(problem.comm.rank)
     first = np.zeros((len(own), 0)) if start is None else own * start
     width = max(_BESIDE, block - first.shape[1])
-    random = np.random.default_rng(rank).standard_normal((len(own), width))
-    return np.hstack([first, correct(own * random)])
+    span = _Span(problem, _ROOM * block + first.shape[1] + width)
+    for turn in range(_MOST_STARTS):
+        random = own * draw.standard_normal((len(own), width))
+        random = correct(products(problem.mass, span.beside(random)[0].T))
+        rows, sizes = span.beside(random if turn else np.hstack([first, random]))
+        if not (turn or (sizes > 0.0).all()):
+            reason = "the preconditioner returns zeros, or what is no number"
+            raise _not_found(reason, "see that it is near the inverse of the stiffness")
+        span.extend(rows, sizes)
+        if len(span) >= min(block, problem.unknowns):
+            break
+    return span
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

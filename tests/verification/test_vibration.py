@@ -23,7 +23,7 @@ from helpers.user_problems import (
 )  # fmt: skip
 from petsc4py import PETSc
 from scipy.io import mmread
-from scipy.linalg import eig, eigh
+from scipy.linalg import block_diag, eig, eigh
 from scipy.optimize import brentq
 from scipy.spatial import KDTree
 
@@ -185,6 +185,53 @@ def test_slender_bodies_under_a_face_that_slides_vibrate_as_dense_matrices(seed)
     # rounding of the dense matrices is 1e-16 of squares 1e9 times as large
     assert found.frequencies == pytest.approx(np.sqrt(squares[:8]) / (2.0 * np.pi), rel=1e-6)
     assert found.residuals.max() < 1e-5
+
+
+def assembled(*arrays):
+    return [PETSc.Mat().createDense(one.shape, array=one).convert("aij") for one in arrays]
+
+
+def turned(whole, draw):
+    """K = Q A Qᵀ with a drawn Q, and M = 1."""
+    turn = np.linalg.qr(draw.standard_normal(whole.shape))[0]
+    return assembled(turn @ whole @ turn.T, np.eye(len(whole)))
+
+
+def test_modes_that_are_repeated_beside_rigid_motions_are_all_found():
+    """A correction raises rigid motions by 1e8, beside which half of nine copies got lost."""
+    draw = np.random.default_rng(164)
+    squares = np.repeat([0.0, 1.0, 2.0, 3.0], [3, 9, 9, 3]) * draw.uniform(0.5, 2.0)
+    found = natural_modes(*turned(np.diag(squares), draw), 9)
+    assert found.eigenvalues.imag**2 == pytest.approx(squares[:9], rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_modes_that_just_merge_are_found_with_nearly_all_others(seed):
+    """The shapes of a, c under couplings b to and −b fro are parallel at b = |a − c|/2."""
+    draw = np.random.default_rng(seed)
+    pairs, share = draw.uniform(1.0, 100.0, (8, 2)), np.where(np.arange(8) < 3, 0.5, 0.3)
+    couplings = share * abs(pairs[:, 0] - pairs[:, 1])
+    blocks = [[[a, b], [-b, c]] for (a, c), b in zip(pairs, couplings, strict=True)]
+    found = natural_modes(*turned(block_diag(*blocks), draw), 15)
+    apart = np.sqrt(0.25 - share**2) * abs(pairs[:, 0] - pairs[:, 1])
+    squares = np.sort((pairs.mean(axis=1) + np.array([[-1.0], [1.0]]) * apart).ravel())
+    count = len(found.frequencies)  # a pair of rounding comes as a whole
+    assert count in (15, 16)
+    # what just merges is known to the root of rounding
+    assert np.sort(-(found.eigenvalues**2).real) == pytest.approx(squares[:count], rel=1e-6)
+
+
+@pytest.mark.parametrize("light", [0.0, 1e-10])
+def test_unknowns_without_a_mass_follow_the_others(light):
+    draw = np.random.default_rng(30)
+    stiff = np.diag(draw.uniform(0.1, 10.0, 25)) + np.ones((25, 25))
+    mass = np.diag(np.where(np.arange(25) % 3 > 0, 1.0, light))
+    found = natural_modes(*assembled(stiff, mass), 14)
+    squares = 1.0 / eigh(mass, stiff, eigvals_only=True)[::-1][:14]
+    assert found.frequencies == pytest.approx(np.sqrt(squares) / (2.0 * np.pi), rel=1e-8)
+    if not light:
+        with pytest.raises(InputError, match="there are not as many modes"):
+            natural_modes(*assembled(stiff, mass), 18)
 
 
 def test_what_has_no_modes_is_refused():
