@@ -153,6 +153,8 @@ def joined(blocks: Sequence[Sequence[PETSc.Mat | None]]) -> PETSc.Mat:
 def joined_diagonal(parts: Sequence[PETSc.Mat]) -> PETSc.Mat:
     """Return the block diagonal matrix of some matrices, see `joined`; collective."""
     count = range(len(parts))
+    if len(parts) == 1:  # a nest of one fails on several ranks
+        return parts[0].convert("aij", PETSc.Mat())
     return joined([[one if i == k else None for k in count] for i, one in enumerate(parts)])
 
 

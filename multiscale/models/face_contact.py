@@ -389,6 +389,22 @@ class FaceContact(LawModel):
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
         return np.asarray(self._laws.interface_stiffness(self._at(patch, closure), patch))
 
+    def vibration_tangents(self, direction: Array | None) -> tuple[str, Array]:
+        """Return where the contact is sampled, and its stiffnesses against small vibrations.
+
+        Args:
+            direction: The direction in which the plane slides, along the axes of the face, (2,);
+                None where it does not.
+        """
+        (problem, state), sliding = self.solved, None
+        if direction is not None:
+            friction = problem.sliders.coefficient if problem.sliders else None
+            if self.rubs is not None:  # it slides as a whole
+                friction = self.rubs[problem.sampling.patch]
+            sliding = np.outer(friction, direction)
+        forces = problem.forces
+        return forces.mode, forces.vibration_tangents(state, sliding)
+
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
         value, iterations = self._problem.tangential_stiffness()

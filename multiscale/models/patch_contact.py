@@ -30,6 +30,10 @@ from patchlaw.multiscale.models.loaded_patches import (
 from patchlaw.multiscale.models.problem import LawModel, in_one_line
 from patchlaw.support import Array, NotConverged, checked
 
+_LEAST_SLOPE = 1e-3
+"""Slope of the closure over the approach, at least, in the stiffness of a patch that vibrates: near
+full contact, where closures turn back, springs are as good as rigid."""
+
 
 class PatchContact(LawModel):
     """Patch laws on the compliance of a body under them; a load step is a small dense system.
@@ -112,6 +116,7 @@ class PathContact(LawModel):
         tilt: Slopes of the plane; None where it was free to turn.
         wear: Coefficient of wear of a surface that slides [mm²/N].
         friction: Coefficient of the friction whose energy is told of what slides.
+        face: The contact face of bodies that vibrate.
 
     Raises:
         ValueError: When the laws have no path.
@@ -124,6 +129,7 @@ class PathContact(LawModel):
         tilt: tuple[float, float] | None = None,
         wear: float = 0.0,
         friction: float = 0.0,
+        face: Any = None,
     ) -> None:
         if table.path is None:
             raise ValueError("the laws were not made of a whole surface")
@@ -132,7 +138,7 @@ class PathContact(LawModel):
         self._levels = [(one, PatchLaws(one.laws)) for one in (new, *table.worn)]
         self._displacements, self.wears = displacements, wear > 0.0
         self._lean = 0.0 if tilt is None else self._local(0.0, *tilt)
-        self._wear, self._friction = wear, friction
+        self._wear, self._friction, self.face = wear, friction, face
         self.past: tuple[SlidLaws, float, LawPoint] | None = None
 
     def _local(self, approach: float, *tilt: float) -> Array:
@@ -214,6 +220,20 @@ class PathContact(LawModel):
         """Return the transmissivities of the patches; see `LawModel.transmissivities`."""
         laws = self._laws_at(step.slid_mm or 0.0, step.approach_mm)
         return laws.transmissivities(step.approach_mm, step.patches.closure_mm, cause, wider)
+
+    def vibration_tangents(self, direction: Array | None) -> tuple[str, Array]:
+        """Return where the contact is sampled, and its stiffnesses; see `FaceContact`."""
+        assert self.past is not None, "load steps have been solved"
+        laws, approach, _ = self.past
+        point, tangents = laws.along(approach), np.zeros((self.table.grid.count, 3, 3))
+        closing = (
+            np.sign(point.dpressure) * point.dclosure
+        )  # a plane that turns leaves some patches
+        stiffness = np.abs(point.dpressure) / np.maximum(closing, _LEAST_SLOPE)
+        tangents[:, 0, 0] = stiffness
+        if direction is not None:
+            tangents[:, 1:, 0] = self._friction * np.outer(stiffness, direction)
+        return "patchwise", tangents[self.face.sampling("patchwise").patch]
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""

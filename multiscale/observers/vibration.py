@@ -68,7 +68,10 @@ class VibrationObserver(StepObserver):
         scene, model = self._coupling.scene, self._coupling.model
         section = scene.vibration
         plane = None if section.plane == "held" else section.plane
-        tangents, mode = self._tangents(), model.solved[0].forces.mode
+        direction = None
+        if section.sliding is not None:
+            direction = np.array(section.sliding) / np.hypot(*section.sliding)
+        mode, tangents = model.vibration_tangents(direction)
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
         with located(key="vibration.modes"):
@@ -102,16 +105,6 @@ class VibrationObserver(StepObserver):
         springs = face_springs(model.face, mode, tangents)
         self._latest = _Seen(found, springs, rows, surfaces)
         return rows
-
-    def _tangents(self) -> Array:
-        """Return the stiffnesses of the contact at its samples, see `vibration_tangents`."""
-        scene, model = self._coupling.scene, self._coupling.model
-        (problem, state), sliding = model.solved, None
-        if (direction := scene.vibration.sliding) is not None:
-            sliders, patch = problem.sliders, problem.forces.sampling.patch
-            friction = sliders.coefficient if sliders else model.rubs[patch]  # slides as a whole
-            sliding = np.outer(friction, np.array(direction) / np.hypot(*direction))
-        return np.asarray(problem.forces.vibration_tangents(state, sliding))
 
     def _element_errors(
         self, tangents: Array, frequency: Array, plane: float | None, *, last: bool

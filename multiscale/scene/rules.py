@@ -307,7 +307,6 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
             ("a shear", whole and bool(slips), "they do not tell how far single contacts slip"),
             ("loads of the body", whole and scene.loads_bodies, "single cells wear without them"),
             ("coupling.interface = 'pointwise'", whole and points, "they wear by patches"),
-            ("vibration", whole and scene.vibration is not None, "they wear on no mesh"),
         ):
             if stated:
                 yield "wear", f"does not go with {key} under laws: {reason}", out

@@ -204,3 +204,40 @@ def test_errors_of_a_plane_that_slides_are_said_to_grow_near_merging(sliding):
     notes = run.history().notes
     assert any("near merging" in one for one in notes) == (sliding is not None)
     run.close()
+
+
+@pytest.mark.long
+def test_patches_that_have_worn_vibrate_as_those_of_the_worn_surface(tmp_path):
+    """The slopes of their laws are those of laws that are made of the heights that are left."""
+    block = {"young_modulus": E, "poisson_ratio": NU, "height": 1.0, "cells": [2, 2, 2]}
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.08, "seed": 5}
+    rest = {
+        "block": block | {"density": "2000 kg/m^3"},
+        "law": {},
+        "coupling": {"kind": "consistent"},
+        "patches": {"grid": [2, 1]},
+        "micro": {"finite_slopes": False},
+        "vibration": {"modes": 3, "plane": "1 g"},
+        "output": {"figures": False, "report": False, "check": "none", "fields": False},
+    }
+    drawn = {"spectrum": spectrum, "grid": [16, 14], "lengths": [1.0, 0.9]}
+    loaded = {"force": 12.0, "steps": 1}
+    slid = {"load": loaded | {"sliding": [7e3]}, "wear": {"coefficient": "1e-8 mm^2/N"}}
+    slid |= {"friction": {"coefficient": 0.3}}  # which a face that slides as a whole does not see
+    run = Run(scene(**rest, **slid, surface=drawn))
+    steps, (lowered,) = list(run.load_steps()), [one[1] for one in run.coupling.worn_depths]
+    heights = np.array(run.coupling.parts.surface.heights)
+    _, rubs = run.coupling.model.vibration_tangents(np.array([0.6, 0.8]))
+    assert rubs[:, 1:, 0] == pytest.approx(np.outer(rubs[:, 0, 0], [0.18, 0.24]), rel=1e-14)
+    run.close()
+    for step, left in zip(steps, (heights, heights - lowered), strict=True):
+        np.save(tmp_path / "left.npy", left)
+        given = {"file": str(tmp_path / "left.npy"), "lengths": [1.0, 0.9]}
+        alone = Run(scene(**rest, load=loaded, surface=given))
+        (own,) = list(alone.load_steps())
+        alone.close()
+        # by rows of their own; measured: 1e-7 new, 1.2e-6 worn
+        expected = [one.frequency_Hz for one in own.modes]
+        assert [one.frequency_Hz for one in step.modes] == pytest.approx(expected, rel=1e-5)
+    first, last = (step.modes[0].frequency_Hz for step in steps)
+    assert last > 1.1 * first  # the contact has grown
