@@ -24,3 +24,8 @@ def test_the_contact_stiffness_is_written_the_same_by_the_meshs_numbers(on_ranks
     (numbers, one), (again, found) = on_ranks[1]["springs"], on_ranks[ranks]["springs"]
     assert sorted(again) == sorted(numbers)
     np.testing.assert_allclose(found, one, rtol=1e-10, atol=1e-10 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_scenes_of_worn_patches_vibrate_on_any_ranks(on_ranks, ranks):
+    np.testing.assert_allclose(on_ranks[ranks]["scene"], on_ranks[1]["scene"], rtol=1e-8)

@@ -1,6 +1,7 @@
 """Natural modes of a block under laws on all ranks, printed as JSON; for the test beside."""
 
 import tempfile
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from patchlaw.macro import (
 )
 from patchlaw.macro.contact.face_vibration import FaceVibration
 from patchlaw.macro.fields import surface_shapes, write_shapes
+from patchlaw.multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]
@@ -73,6 +75,24 @@ def modes(element, mode, plane, sliding, factorised):
     return whole.tolist(), float(found.residuals.max()), facets
 
 
+def scene():
+    """Return frequencies of a block of few cells under laws of patches that wear [Hz]."""
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.08, "seed": 77}
+    block = {"young_modulus": 4000.0, "poisson_ratio": 0.2, "density": "2500 kg/m^3"}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [18, 16], "lengths": [1.0, 0.93]},
+        "block": block | {"height": 1.0, "cells": [2, 2, 2]},
+        "coupling": {"kind": "consistent"},
+        "patches": {"grid": [2, 2]},
+        "wear": {"coefficient": "1e-8 mm^2/N"},
+        "load": {"force": 9.0, "steps": 1, "sliding": [2e3], "tilt": [1.1e-3, -7e-4]},
+        "vibration": {"modes": 3},
+        "output": {"figures": False, "report": False, "check": "none", "contact": "none"},
+    }
+    with closing(Run(Scene.from_dict(data), COMM)) as run:
+        return [mode.frequency_Hz for step in run.load_steps() for mode in step.modes]
+
+
 def springs():
     """Return a contact stiffness as a matrix by the numbers of nodes in the file of the mesh."""
     mesh = box(cell=TETRAHEDRA, comm=COMM)
@@ -91,5 +111,5 @@ def springs():
 
 if __name__ == "__main__":
     result = {name: modes(*case) for name, case in CASES.items()}
-    result["springs"] = springs()
+    result |= {"springs": springs(), "scene": scene()}
     tell(result)
