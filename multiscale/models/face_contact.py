@@ -398,10 +398,10 @@ class FaceContact(LawModel):
         """
         (problem, state), sliding = self.solved, None
         if direction is not None:
-            friction = problem.sliders.coefficient if problem.sliders else None
             if self.rubs is not None:  # it slides as a whole
-                friction = self.rubs[problem.sampling.patch]
-            sliding = np.outer(friction, direction)
+                sliding = np.outer(self.rubs[problem.sampling.patch], direction)
+            elif problem.sliders is not None:
+                sliding = np.outer(problem.sliders.coefficient, direction)
         forces = problem.forces
         return forces.mode, forces.vibration_tangents(state, sliding)
 

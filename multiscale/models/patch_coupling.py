@@ -285,9 +285,9 @@ class PatchCoupling(CellCoupling):
                 table = self.table = self._with_wear(table)
         if table.path is not None and (section or (tilt is None and self._pressed_evenly)):
             moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
-            coefficients = (one.coefficient if one and section else 0.0 for one in (section, rubs))
+            wear, rubbed = (one.coefficient if one and section else 0.0 for one in (section, rubs))
             face = self.bodies.contact_face if self.scene.vibration else None
-            return PathContact(table, moved, tilt, *coefficients, face=face)
+            return PathContact(table, moved, tilt, wear=wear, friction=rubbed, face=face)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
