@@ -226,9 +226,7 @@ class PathContact(LawModel):
         assert self.past is not None, "load steps have been solved"
         laws, approach, _ = self.past
         point, tangents = laws.along(approach), np.zeros((self.table.grid.count, 3, 3))
-        closing = (
-            np.sign(point.dpressure) * point.dclosure
-        )  # a plane that turns leaves some patches
+        closing = np.sign(point.dpressure) * point.dclosure  # some are left as the plane turns
         stiffness = np.abs(point.dpressure) / np.maximum(closing, _LEAST_SLOPE)
         tangents[:, 0, 0] = stiffness
         if direction is not None:
