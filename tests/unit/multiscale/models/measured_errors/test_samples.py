@@ -190,6 +190,7 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
 
 
+@pytest.mark.long
 def test_errors_of_samples_do_not_depend_on_the_unit_of_pressures():
     def errors(unit):
         block = {"young_modulus": 4100.0 * unit, "poisson_ratio": 0.17}
