@@ -45,7 +45,7 @@ COUPLINGS = {  # name, and where it stands beside the first curve
     "isolated": ("patches on their own", (1.1, 20.0), "left"),
     "consistent": ("laws of the\nwhole surface", (4.0, 1.6), "left"),
     "concurrent": ("contacts\nand block\ntogether", (0.2, 0.28), "right"),
-    "reference": ("roughness\nmeshed", (20.0, 0.4), "left"),
+    "reference": ("roughness\nmeshed", (32.0, 0.4), "left"),
 }
 
 
