@@ -46,6 +46,7 @@ _ROOM = 5
 twentieth."""
 _MOST_STEPS = 300
 _MOST_STARTS = 4
+"""Draws of first vectors, until none of the modes that are asked for has too few of them."""
 _NEW, _COPY = 0.5, 1e-10
 """Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
 among new ones that counts as a combination of the others."""
@@ -217,9 +218,8 @@ class _Problem:
         values = np.sqrt(-np.where(zero, 0.0, squares) + 0j)
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
-        floor = _SHIFT * np.where(
-            zero, self.largest * momenta, stiff
-        )  # rigid motions have no forces
+        # rigid motions have no forces
+        floor = _SHIFT * np.where(zero, self.largest * momenta, stiff)
         left, *usual = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
             for one in (forces + values**2 * momenta, forces, values**2 * momenta, floor)

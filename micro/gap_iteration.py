@@ -27,9 +27,9 @@ _MOST_TOGETHER = 192**2
 """Cells up to which directions are solved together. More than that of one fill a core's cache."""
 _MOST_ITERATIONS = 100
 """Iterations end when the last quarter of them, two at least, changed the flow by the tolerance of
-it. With 10⁻⁷ that left 2 · 10⁻¹³ of the flow in the median of 228 on 73² to 140² cells, 5 to 62 %
-in contact, and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹ and 6 · 10⁻⁸, and
-3 · 10⁻⁵ on a map that took 51 iterations."""
+it. With 10⁻⁷ that left, begun with no pressure, 2 · 10⁻¹³ of the flow in the median of 228 on 73²
+to 140² cells, 5 to 62 % in contact, and 8 · 10⁻¹⁰ in 95 %; by the last two changes alone 2 · 10⁻¹¹
+and 6 · 10⁻⁸, and 3 · 10⁻⁵ on a map that took 51 iterations."""
 _MOST_PER_CELL = 0.3
 """How many of them at most per cell along the shorter side. Factors take as long as half of that.
 Of 48 gaps on 73² to 140² cells both flows took 3.3 s of CPU so, 3.6 s without; of 30 others, whose

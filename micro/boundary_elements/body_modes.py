@@ -678,8 +678,7 @@ def half_space_traction_modes(
 
     Returns:
         Displacements along x, y and into the body by tractions likewise, shape (3, 3, K², K²)
-        [1/mm]. Those into the body by pressures are left 0:
-        `micro.boundary_elements.body_modes.half_space_modes` has them.
+        [1/mm]. Those into the body by pressures are left 0: `half_space_modes` has them.
 
     Source:
         Johnson, Contact Mechanics (1985), eqs. 3.19 and 3.75.
