@@ -37,9 +37,10 @@ import numpy as np
 
 from patchlaw import InputError, NotConverged
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
+from patchlaw.micro.half_space.error_probe import _Problems
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
-from patchlaw.multiscale.models.measured_errors.contact import _Problems
+from patchlaw.multiscale.bodies.bodies import on_body
 
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""

@@ -63,6 +63,9 @@ from patchlaw.support import BLOCK, Array, InputError, blocks, cached_where_smal
 
 Around = Literal["copies", "mirrored", "nothing"]
 
+SLOPES = 2
+"""Order of finite slopes where they are taken into account."""
+
 
 class Waves:
     """Waves on a torus of which a rectangle of coarse cells is the whole or a quarter.

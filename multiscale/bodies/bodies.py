@@ -20,6 +20,7 @@ import numpy as np
 
 from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
+from patchlaw.micro.half_space.error_probe import OnBody
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term, mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
@@ -29,11 +30,6 @@ if TYPE_CHECKING:  # finite elements and laws are imported only by scenes that n
     from patchlaw.macro import ElasticBody, FaceCompliance, FacePair, LoadedFace
     from patchlaw.multiscale.laws.of_patches import Displacements
 
-OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
-"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
-
-SLOPES = 2
-"""Order of finite slopes where they are taken into account."""
 _RESIDUAL = 1e-10
 """Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
 of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""

@@ -24,9 +24,10 @@ from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.geometry.statistics import check_finite_slopes
 from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
+from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.wear import slide, worn_depths
-from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model, Slid, in_one_line

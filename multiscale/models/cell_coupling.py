@@ -19,12 +19,13 @@ import numpy as np
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel
-from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
+from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
+from patchlaw.micro.half_space.error_probe import ErrorProbe, OnBody, error_by_cells
+from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF, WearErrors
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,

@@ -17,12 +17,12 @@ import numpy as np
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro.half_space.error_probe import MOST_CHECKED_CELLS
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import Clock, ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe, validity
-from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.history import range_notes

@@ -16,7 +16,8 @@ from patchlaw.geometry import Control, Friction, roughness
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel, MicroModel
-from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
+from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS

@@ -17,6 +17,7 @@ import numpy as np
 from patchlaw.geometry import Control, Friction, Surface, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms import crowned_peak
+from patchlaw.micro.half_space.error_probe import coarser
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
@@ -30,7 +31,6 @@ from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
-from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
 from patchlaw.multiscale.models.measured_errors.faces import (
     LawErrorProbe,

@@ -20,12 +20,12 @@ from functools import partial
 from typing import Any, NamedTuple, cast
 
 from patchlaw.geometry.surface import Zero
+from patchlaw.micro.half_space.error_probe import ZERO, ErrorProbe, read
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cell_coupling import CellCoupling
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.faces import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,

@@ -1,1 +1,4 @@
-"""Errors of load steps by cause, measured in the run: of contacts, of laws of samples, of shear."""
+"""Errors of load steps by cause: of laws of samples, of shear, and as columns and reports say them.
+
+Those of contacts on cells are measured by `micro.half_space.error_probe`.
+"""

@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from patchlaw.micro.half_space.error_probe import ZERO, ContactErrors, stated
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.support import Array
 from patchlaw.support.readable import Caution, percent, quantities, quantity
@@ -18,8 +18,6 @@ from patchlaw.support.readable import Caution, percent, quantities, quantity
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}
 """Columns of what is read off solutions besides the force, and of their errors."""
-ZERO = "zero"
-"""Name of the error by the height that approaches count from."""
 _ROUNDING = 1e-9
 """Share of a worn depth that solutions of one force differ by."""
 
@@ -63,17 +61,10 @@ class WearErrors(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuredErrors:
-    """What the force under a given plane may be off by, and what else is read off there.
+class MeasuredErrors(ContactErrors):
+    """Errors of a load step: of its contacts, of what has worn off them and of their shear.
 
     Attributes:
-        by_cause: By cause errors of the force [N], of the contact area fraction and of the mean
-            gap [mm]; where they were requested, of the interface's stiffness, relative to it; and,
-            where they may be others, of its conductance and of the stiffness against the approach,
-            likewise; shape (3,), (4,) or (6,). Infinite where they cannot be measured.
-        stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
-            it was not requested.
-        zero: Error of the height that the approach counts from [mm].
         worn: By cause errors of the mean and of the largest worn depth [mm], shape (2,); empty
             where nothing wears.
         shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
@@ -81,29 +72,8 @@ class MeasuredErrors:
             area that slips; shape (2,) or (3,). Empty without friction.
     """
 
-    by_cause: dict[str, Array]
-    stiffness: float
-    zero: float = 0.0
     worn: dict[str, Array] = field(default_factory=dict)
     shear: dict[str, Array] = field(default_factory=dict)
-
-    @property
-    def parts(self) -> dict[str, float]:
-        """Error of the force by cause [N]."""
-        return {cause: float(error[0]) for cause, error in self.by_cause.items()}
-
-    @property
-    def force(self) -> float:
-        """Error of the force at the approach, the sum of all parts [N]."""
-        return sum(self.parts.values())
-
-    @property
-    def approach(self) -> float:
-        """Error of the approach under the force [mm]; 0 without contact, infinite if not known."""
-        if self.stiffness > 0.0:  # which NaN is not
-            others = self.force - self.parts.get(ZERO, 0.0)
-            return others / self.stiffness + self.zero
-        return math.inf if self.force else 0.0
 
     def with_cause(
         self, step: LoadStep, cause: str, force: float, approach: float, area: float, gap: float
@@ -191,11 +161,6 @@ class MeasuredErrors:
 def _shares(share: float, *sizes: float) -> Array:
     """Return a share of sizes, of nothing 0 even where the share is not known."""
     return np.array([share * size if size else 0.0 for size in sizes])
-
-
-def stated(errors: ArrayLike) -> Array:
-    """Return errors, infinite where they are not known."""
-    return np.where(np.isnan(errors), math.inf, errors)
 
 
 def finite(error: float) -> float | None:

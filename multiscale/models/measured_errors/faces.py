@@ -27,12 +27,13 @@ import numpy as np
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.sliders import MOST_REMEMBERED, SliderRecord
+from patchlaw.micro.half_space.error_probe import ZERO
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors
+from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
     SampleProbe,
     closure_under,

@@ -32,12 +32,11 @@ from patchlaw.geometry import Control, ShearControl, ShearState, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.friction.coupled import press_coupled
+from patchlaw.micro.half_space.error_probe import ZERO, ErrorProbe, other_bodies
 from patchlaw.micro.wear import worn_depths
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.models.measured_errors.errors import (
     ERRORS_OF,
-    ZERO,
     MeasuredErrors,
     WearErrors,
     error_columns,
@@ -141,7 +140,11 @@ def _of_normal_force(
         stiffnesses=(own or math.nan, known or math.nan) if wanted else None,
         elastic=bool(own) and not step.stiffness_scatter,
     )
-    return found if known is None else replace(found, stiffness=known)
+    return MeasuredErrors(
+        by_cause=found.by_cause,
+        stiffness=found.stiffness if known is None else known,
+        zero=found.zero,
+    )
 
 
 def shear_errors(

@@ -36,8 +36,8 @@ from patchlaw.geometry import Control, ShearControl, ShearState, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.micro import FrictionModel, HalfSpaceModel
+from patchlaw.micro.half_space.error_probe import coarser
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of

@@ -15,9 +15,9 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, mirrored, synthesise
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.half_space.error_probe import ErrorProbe, read
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.runs.output.results import write_results

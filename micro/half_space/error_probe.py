@@ -1,6 +1,6 @@
-"""Errors of load steps by cause, measured in the run by further contact problems.
+"""Errors of contacts by cause, measured by further contact problems.
 
-Each cause is varied while all others stay, under the plane of the load step: the grid against other
+Each cause is varied while all others stay, under the plane of a load step: the grid against other
 grids, the laws against the contact problem, the modes of the body against fewer, finite slopes
 against those of a half-space and by the size of the orders that they leave out. Causes hardly
 depend on each other. All but the grid are therefore measured on half as many cells a side. What
@@ -28,7 +28,7 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -37,12 +37,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, Surface, overlaps
-from patchlaw.geometry.contact_state import Start
-from patchlaw.micro import BodyModes, ContactState, FiniteSlopes, HalfSpaceModel, NormalStiffness
-from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
-from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
+from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.micro.boundary_elements.body_modes import BodyModes
+from patchlaw.micro.boundary_elements.finite_slopes import SLOPES, FiniteSlopes
+from patchlaw.micro.half_space.model import HalfSpaceModel
+from patchlaw.micro.model import NormalStiffness
 from patchlaw.support import Array, InputError
 from patchlaw.support.readable import WHOLE, ProgressObserver, unobserved
+
+OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
+"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
+
+ZERO = "zero"
+"""Name of the error by the height that approaches count from."""
 
 MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
@@ -64,6 +71,43 @@ were 3 to 8 × the true ones in the median."""
 _UNKNOWN = math.nan, math.nan
 _OF_YIELDING = 0.5
 """Error of the stiffness of cells that yield over what fewer cells change by as `_OF_OTHERS`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactErrors:
+    """What the force under a given plane may be off by, and what else is read off there.
+
+    Attributes:
+        by_cause: By cause errors of the force [N], of the contact area fraction and of the mean
+            gap [mm]; where they were requested, of the interface's stiffness, relative to it; and,
+            where they may be others, of its conductance and of the stiffness against the approach,
+            likewise; shape (3,), (4,) or (6,). Infinite where they cannot be measured.
+        stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
+            it was not requested.
+        zero: Error of the height that the approach counts from [mm].
+    """
+
+    by_cause: dict[str, Array]
+    stiffness: float
+    zero: float = 0.0
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Error of the force by cause [N]."""
+        return {cause: float(error[0]) for cause, error in self.by_cause.items()}
+
+    @property
+    def force(self) -> float:
+        """Error of the force at the approach, the sum of all parts [N]."""
+        return sum(self.parts.values())
+
+    @property
+    def approach(self) -> float:
+        """Error of the approach under the force [mm]; 0 without contact, infinite if not known."""
+        if self.stiffness > 0.0:  # which NaN is not
+            others = self.force - self.parts.get(ZERO, 0.0)
+            return others / self.stiffness + self.zero
+        return math.inf if self.force else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,7 +146,7 @@ class ErrorProbe:
         by_force: bool = False,
         stiffnesses: tuple[float, float] | None = None,
         elastic: bool = False,
-    ) -> MeasuredErrors:
+    ) -> ContactErrors:
         """Measure the errors of the force of one load step, and of what else is read off it.
 
         Args:
@@ -141,7 +185,7 @@ class ErrorProbe:
         if stiffnesses is not None:
             shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
             parts = {cause: np.append(error, shares[cause]) for cause, error in parts.items()}
-        return MeasuredErrors(
+        return ContactErrors(
             by_cause={cause: stated(error) for cause, error in parts.items()},
             stiffness=problems.stiffness() if stiffness else math.nan,
             zero=self.zero,
@@ -174,6 +218,11 @@ _Behind = tuple[HalfSpaceModel, ContactState]
 def read(state: ContactState) -> Array:
     """Return force [N], contact area fraction and mean gap [mm] of a contact, shape (3,)."""
     return np.array([state.force, state.contact_area_fraction, state.mean_separation])
+
+
+def stated(errors: ArrayLike) -> Array:
+    """Return errors, infinite where they are not known."""
+    return np.where(np.isnan(errors), math.inf, errors)
 
 
 def error_by_cells(own: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Array:
