@@ -226,10 +226,13 @@ def side_stress_modes(sides: FreeSides, count: int) -> Array:
 
 def _of_sides(sides: FreeSides, count: int, *, stress: bool) -> Array:
     """Return the displacements, or the stresses xx, yy and xy, by all sides in modes."""
-    across_x = _by_two(sides, 0, count, stress=stress).transpose(0, 1, 3, 2, 4)
-    across_y = _by_two(sides, 1, count, stress=stress).transpose(0, 3, 1, 4, 2)
-    total = across_x + (across_y[[1, 0, 2]] if stress else across_y)
-    area = sides.lengths[0] * sides.lengths[1]
+    width, height = sides.lengths
+    across_x = _by_two(sides, 0, count, stress=stress)
+    alike = width == height and sides.pair(0) == sides.pair(1)
+    across_y = across_x if alike else _by_two(sides, 1, count, stress=stress)
+    across_y = across_y.transpose(0, 3, 1, 4, 2)
+    total = across_x.transpose(0, 1, 3, 2, 4) + (across_y[[1, 0, 2]] if stress else across_y)
+    area = width * height
     return np.asarray(total.reshape(len(total), count**2, count**2) / area**2)
 
 
