@@ -91,6 +91,7 @@ def console_of(
         stderr=stderr,
         soft_wrap=not least_width,
         highlight=False,
+        emoji=False,  # names of files may hold what stands for one
         quiet=not speaks(comm),
         force_terminal=moving or detected,
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without

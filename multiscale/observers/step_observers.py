@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -372,36 +371,22 @@ def missing_energy(steps: Sequence[LoadStep]) -> float:
     Args:
         steps: Load steps one after another.
     """
-    worst = largest = 0.0
     known = [step for step in steps if step.elastic_energy_mJ is not None]
     if known and known[-1].slid_mm:  # what wears off takes energy with it
         known = [step for step in known if not step.slid_mm]
-    softer = _softer_body(known)
-    for before, step in pairwise(known):
-        motion = _motion(step) - _motion(before)
-        stored = [
-            (each.elastic_energy_mJ or 0.0) + (each.plastic_work_mJ or 0.0)
-            for each in (before, step)
-        ]
-        rise, largest = stored[1] - stored[0], max(largest, *stored)
-        bounds = sorted((float(_load(before) @ motion), float(_load(step) @ motion)))
-        slack = 0.5 * softer * (step.force_N - before.force_N) ** 2
-        worst = max(worst, bounds[0] - rise - slack, rise - bounds[1] - slack)
-    return worst / largest if largest else 0.0
-
-
-def _softer_body(steps: Sequence[LoadStep]) -> float:
-    """Return the compliance of a body with which no approach falls as the force rises [mm/N].
-
-    That of a period in full contact does, with finite slopes. Its energy is convex together with
-    that of a smooth body below it.
-    """
-    most, least = 0.0, _ROUNDING * max((step.force_N for step in steps), default=0.0)
-    for before, step in pairwise(steps):
-        moved, rise = step.approach_mm - before.approach_mm, step.force_N - before.force_N
-        if abs(rise) > least:
-            most = max(most, -moved / rise)
-    return most
+    motions, loads = (np.reshape([of(one) for one in known], (-1, 3)) for of in (_motion, _load))
+    stored = np.array(
+        [(one.elastic_energy_mJ or 0.0) + (one.plastic_work_mJ or 0.0) for one in known]
+    )
+    moved, rise, forces = np.diff(motions, axis=0), np.diff(stored), np.diff(loads[:, 0])
+    # The approach of a period in full contact falls with finite slopes as the force rises. Its
+    # energy is convex together with that of a smooth body below it, with which none falls.
+    counts = np.abs(forces) > _ROUNDING * loads[:, 0].max(initial=0.0)
+    softer = np.max(-moved[counts, 0] / forces[counts], initial=0.0)
+    least, most = np.sort([(one * moved).sum(axis=1) for one in (loads[:-1], loads[1:])], axis=0)
+    beyond = np.maximum(least - rise, rise - most) - 0.5 * softer * forces**2
+    worst, largest = beyond.max(initial=0.0), stored.max(initial=0.0)
+    return float(worst / largest) if largest else 0.0
 
 
 def _motion(step: LoadStep) -> Array:

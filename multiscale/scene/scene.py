@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -480,6 +479,8 @@ def arrays_of(path: Path) -> list[Path]:
     """
     if path.suffix.lower() != ".xdmf":
         return []
+    from xml.etree import ElementTree  # others do without
+
     names = {path.with_suffix(".h5").name}
     with suppress(OSError, ElementTree.ParseError):
         for item in ElementTree.parse(path).iter("DataItem"):

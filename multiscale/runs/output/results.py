@@ -17,7 +17,6 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 from pydantic_core import to_jsonable_python
@@ -336,6 +335,8 @@ def _check_complete(path: Path) -> None:
 
         h5py.File(path, "r").close()
     elif path.suffix == ".xdmf":
+        from xml.etree import ElementTree
+
         try:
             ElementTree.parse(path)
         except ElementTree.ParseError:

@@ -179,3 +179,13 @@ def test_laws_say_how_many_rows_and_patches_are_done():
     ends = np.full(4, 9e-3)
     isolated_laws(model, patches, mean_heights=means, closure_ends=ends, observe=observe)
     assert told == [("laws of patches", done, 4) for done in (1, 2, 3, 4)]
+
+
+def test_names_of_files_are_shown_as_they_are(capsys):
+    console.say(None, "a:fire:b[red]c.toml")
+    console.show_pairs(None, [("file", "d:fire:e[red]f")])
+    console.show_notes(None, ["g:fire:h[red]i"])
+    shown = capsys.readouterr().out
+    assert all(
+        text in shown for text in ("a:fire:b[red]c.toml", "d:fire:e[red]f", "g:fire:h[red]i")
+    )
