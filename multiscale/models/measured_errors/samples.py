@@ -23,12 +23,12 @@ from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import FiniteSlopes, FrictionModel, HalfSpaceModel
 from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
+from patchlaw.micro.half_space.edges import edge_width
 from patchlaw.micro.half_space.error_probe import ErrorProbe, error_by_cells, read, stated
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
-from patchlaw.multiscale.models.measured_errors.edges import edge_width
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support import Array, NotConverged, shared
 from patchlaw.support.readable import WHOLE, ProgressObserver, unobserved

@@ -8,9 +8,9 @@ import pytest
 
 from patchlaw.geometry import Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.half_space import edges as edge_errors
+from patchlaw.micro.half_space.edges import edge_width
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.models.measured_errors import edges as edge_errors
-from patchlaw.multiscale.models.measured_errors.edges import edge_width
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, Decision
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)

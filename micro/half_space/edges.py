@@ -18,7 +18,8 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Material, Surface
-from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.micro.boundary_elements.free_sides import FreeSides
+from patchlaw.micro.half_space.model import HalfSpaceModel
 from patchlaw.support import Array, NotConverged
 
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
