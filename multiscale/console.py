@@ -199,17 +199,13 @@ def show_history(comm: Any, history: Any) -> None:
         history: The `multiscale.results.history.History`.
     """
     if _prints(comm):
-        _show_numbers(comm, history)
+        header, rows = history.table(most=60)
+        console = console_of(comm, least_width=TABLE_WIDTH)
+        # a log takes lines of any length; a reference has one more column
+        more = 16 * (history.reference is not None) if console.is_terminal else TABLE_WIDTH
+        console.width = max(console.width, TABLE_WIDTH + more)
+        console.print(_table([name.replace(" [", "\n[") for name in header], rows))
     show_notes(comm, history.notes)
-
-
-def _show_numbers(comm: Any, history: Any) -> None:
-    header, rows = history.table(most=60)
-    console = console_of(comm, least_width=TABLE_WIDTH)
-    # a log takes lines of any length; a reference has one more column
-    more = 16 * (history.reference is not None) if console.is_terminal else TABLE_WIDTH
-    numbers = _table([name.replace(" [", "\n[") for name in header], rows)
-    console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
 
 
 def show_notes(comm: Any, notes: Iterable[str]) -> None:

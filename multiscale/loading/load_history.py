@@ -112,7 +112,7 @@ class LoadHistory:
             raise InputError(
                 "needs exactly one load", allowed="'approach', 'force', 'pressure' or 'stage'"
             )
-        if self.cycles > 1 and len(self._stated_points) < 2:
+        if self.cycles > 1 and len(self.stated[1]) < 2:
             raise InputError(
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
@@ -131,7 +131,7 @@ class LoadHistory:
         """Refuse two shear loads, what belongs to none, and senseless paths."""
         points, either = self.stated_shear, "either 'shear' or 'shear_force'"
         key = "shear" if self.shear_force is None else "shear_force"
-        along, count, cycles = self.shear_path == "along", len(self._stated_points), "shear_cycles"
+        along, count, cycles = self.shear_path == "along", len(self.stated[1]), "shear_cycles"
         beside = [
             one for one in ("shear_path", "shear_steps", cycles) if one in changed_fields(self)
         ]
@@ -163,10 +163,10 @@ class LoadHistory:
                 raise InputError(problem, key=name, allowed=allowed or None, **value)
 
     @property
-    def stated(self) -> tuple[str, list[float] | None]:
-        """The key of the load, and its turning points as they were stated; None of stages."""
+    def stated(self) -> tuple[str, list[float]]:
+        """The key of the load, and its turning points as they were stated; none of stages."""
         key = self._stated_keys[0]
-        return key, None if self.stage else list(getattr(self, key))
+        return key, [] if self.stage else list(getattr(self, key))
 
     @property
     def _stated_keys(self) -> list[str]:
@@ -181,11 +181,6 @@ class LoadHistory:
     def slides(self) -> bool:
         """Whether the surfaces slide on each other."""
         return bool(self.sliding) or any(one.sliding for one in self.stage)
-
-    @property
-    def _stated_points(self) -> tuple[float, ...]:
-        """Turning points as they were stated; none of stages."""
-        return self.approach or self.force or self.pressure or ()
 
     @property
     def slopes(self) -> tuple[float, float] | None:
@@ -203,7 +198,7 @@ class LoadHistory:
         if self.stage:
             return [(1, stage) for stage in self.stage]
         key, points = self.stated
-        loads: list[Any] = [{key: point} for point in points or ()]
+        loads: list[Any] = [{key: point} for point in points]
         pairs: list[Any] = [{self.shear_key: (pair,)} for pair in self.stated_shear]
         if self.shear_path == "along" and pairs:
             loads = [load | pair for load, pair in zip(loads, pairs, strict=True)]

@@ -97,7 +97,7 @@ def load(parts: SceneParts) -> str:
     """Say the load steps."""
     history = parts.scene.loading
     key, points = history.stated
-    if points is None:
+    if not points:
         text = f"{history.count} steps: {'; '.join(stages(parts))}"
     else:
         unit, what, _ = LOADS[key]
@@ -125,8 +125,7 @@ def load(parts: SceneParts) -> str:
 
 def _shear(history: LoadHistory) -> str:
     """Say the shear of a load history."""
-    points = history.shear or history.shear_force or ()
-    way = ", ".join(_pair(history, pair) for pair in points)
+    way = ", ".join(_pair(history, pair) for pair in history.stated_shear)
     what = "a shift" if history.shear_key == "shear" else "a shear force"
     again = f", {history.shear_cycles} times" * (history.shear_cycles > 1)
     if history.shear_path == "along":

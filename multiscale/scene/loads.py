@@ -209,8 +209,7 @@ def _pressed_to_nothing(scene: Scene, loads: LoadsOnFace, body: BodyFacts) -> It
 
 def _stated(scene: Scene, step: Step) -> tuple[str, Any]:
     """Return the key that states the load of a step, and what stands there."""
-    points = scene.loading.stated[1]
-    if points is not None:
+    if points := scene.loading.stated[1]:
         return step.key, _with_unit(step.key, points)
     _, _, number, *quantity = step.key.split(".")  # without one of a pull alone
     value = getattr(scene.loading.stage[int(number)], *quantity) if quantity else None
