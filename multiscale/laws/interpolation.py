@@ -305,9 +305,14 @@ def curves_from_touch(rows: LawRows) -> LawCurves:
 
 def rising_curves(rows: LawRows) -> LawCurves:
     """Return the laws of K patches alone through their rows, columns of shape (m, K)."""
-    each = [rows[:, law].rising()[0] for law in range(rows.pressure.shape[1])]
+    count, laws = rows.pressure.shape
+    if all((np.diff(part, axis=0) > 0.0).all() for part in (rows.pressure, rows.closure)):
+        return LawCurves.through(
+            rows.mapped(lambda part: part.T.ravel()), [count] * laws, np.zeros(laws)
+        )
+    each = [rows[:, law].rising()[0] for law in range(laws)]
     counts = [len(one) for one in each]
-    return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(len(each)))
+    return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(laws))
 
 
 def _lines_through(untouched: Sequence[Untouched]) -> Array:

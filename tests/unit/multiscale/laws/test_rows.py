@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale import LawTable, PatchLaw, read_laws, write_laws
+from patchlaw.multiscale.laws.interpolation import rising_curves
 from patchlaw.multiscale.laws.patch_law import repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 
@@ -79,6 +80,23 @@ def test_a_closure_a_little_below_is_left_out_and_said():
     found, change = given.rising()
     assert all(np.array_equal(one, np.delete(other, 4)) for one, other in pairs(found, given))
     assert change == pytest.approx(4e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize("second", [2.0, 0.0])
+def test_curves_of_laws_side_by_side_are_those_of_each(second):
+    first = rows(4e5 * APPROACH**1.5)
+    noisy_one = replace(first, pressure=noisy())  # takes out rows where it is the second law
+    other = noisy_one if second == 0.0 else replace(first, pressure=second * first.pressure)
+    columns = {name: np.stack(both, axis=1) for (name, _), both in zip(
+        first.columns(), pairs(first, other), strict=True)}  # fmt: skip
+    together, at = rising_curves(LawRows(**columns)), APPROACH[1:-1] + 1e-5
+    for number, one in enumerate((first, other)):
+        alone = rising_curves(one.mapped(lambda column: column[:, None]))
+        for found, known in zip(
+            together.at(np.full(len(at), number), at), alone.at(np.zeros(len(at), int), at),
+            strict=True,
+        ):  # fmt: skip
+            np.testing.assert_array_equal(found, known)
 
 
 def repair_notes(found):
