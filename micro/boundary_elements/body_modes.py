@@ -230,10 +230,9 @@ def _of_sides(sides: FreeSides, count: int, *, stress: bool) -> Array:
     across_x = _by_two(sides, 0, count, stress=stress)
     alike = width == height and sides.pair(0) == sides.pair(1)
     across_y = across_x if alike else _by_two(sides, 1, count, stress=stress)
-    across_y = across_y.transpose(0, 3, 1, 4, 2)
-    total = across_x.transpose(0, 1, 3, 2, 4) + (across_y[[1, 0, 2]] if stress else across_y)
-    area = width * height
-    return np.asarray(total.reshape(len(total), count**2, count**2) / area**2)
+    turned = (across_y[[1, 0, 2]] if stress else across_y).transpose(0, 3, 1, 4, 2)
+    total = across_x.transpose(0, 1, 3, 2, 4) + turned
+    return np.asarray(total.reshape(len(total), count**2, count**2) / (width * height) ** 2)
 
 
 def _by_two(sides: FreeSides, axis: int, count: int, *, stress: bool) -> Array:

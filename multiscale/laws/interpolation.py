@@ -305,14 +305,13 @@ def curves_from_touch(rows: LawRows) -> LawCurves:
 
 def rising_curves(rows: LawRows) -> LawCurves:
     """Return the laws of K patches alone through their rows, columns of shape (m, K)."""
-    count, laws = rows.pressure.shape
+    laws = rows.pressure.shape[1]
     if all((np.diff(part, axis=0) > 0.0).all() for part in (rows.pressure, rows.closure)):
-        return LawCurves.through(
-            rows.mapped(lambda part: part.T.ravel()), [count] * laws, np.zeros(laws)
-        )
-    each = [rows[:, law].rising()[0] for law in range(laws)]
-    counts = [len(one) for one in each]
-    return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(laws))
+        used, counts = rows.mapped(lambda part: part.T.ravel()), [len(rows)] * laws
+    else:
+        each = [rows[:, law].rising()[0] for law in range(laws)]
+        used, counts = each[0].joined(*each[1:]), [len(one) for one in each]
+    return LawCurves.through(used, counts, np.zeros(laws))
 
 
 def _lines_through(untouched: Sequence[Untouched]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -399,13 +400,10 @@ class LoadStep(Displayed):
         """
         if before is None or self.slid_since(before):
             return False
-        for here, there in (
-            (self.force_N, before.force_N),
-            (self.approach_mm, before.approach_mm),
-        ):
-            if abs(here - there) > _SAME * max(abs(here), abs(there)):
-                return here < there
-        return False
+        if not math.isclose(self.force_N, before.force_N, rel_tol=_SAME):
+            return self.force_N < before.force_N
+        same = math.isclose(self.approach_mm, before.approach_mm, rel_tol=_SAME)
+        return not same and self.approach_mm < before.approach_mm
 
     def slid_since(self, before: LoadStep | None) -> bool:
         """Tell whether the surfaces slid on each other, and wore, on the way to this load step.
