@@ -193,14 +193,14 @@ class ContactRecorder(StepObserver):
         """Record the contact of a load step if it is requested."""
         self._state, self._seen = self._coupling.model.latest, step.step
         self._unloading = step.is_unloading(past[-1] if past else None)
-        return self._recorded(step) if last or self._asked == "all" else {}
+        return self.recorded(step) if last or self._asked == "all" else {}
 
-    def finish(self, step: LoadStep) -> Columns:
-        """Record the contact of the last load step of a run that ended early."""
-        return self._recorded(step)
+    def recorded(self, step: LoadStep) -> Columns:
+        """Record the contact of a load step, once; return columns that a contact behind laws tells.
 
-    def _recorded(self, step: LoadStep) -> Columns:
-        """Return the largest pressure of a contact behind laws; every contact is recorded once."""
+        Args:
+            step: The load step seen last, or the last one of a run that ended early.
+        """
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
             return {}

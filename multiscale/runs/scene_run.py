@@ -212,7 +212,7 @@ class Run:
         """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
             with self.clock.phase("contact"):
-                columns = self.observers.contacts.finish(self.steps[-1])
+                columns = self.observers.contacts.recorded(self.steps[-1])
             self.steps[-1] = replace(self.steps[-1], **columns)
 
     @property
