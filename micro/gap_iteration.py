@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from patchlaw.micro.gap_multigrid import COARSEST, PARITIES, Cells, Cycle, Offset, Parts, shifted
+from patchlaw.micro.gap_multigrid import (
+    COARSEST,
+    PARITIES,
+    Cells,
+    Cycle,
+    Offset,
+    Parts,
+    inside,
+    padded,
+    shifted,
+)
 from patchlaw.support import Array
 
 _BETWEEN, _SOLVED = PARITIES[:2], PARITIES[2:]
@@ -248,22 +258,24 @@ class _Iteration:
     def __init__(self, cycle: Cycle, source: Array, start: Sequence[Array]) -> None:
         self._cycle, self._grid = cycle, cycle.grids[0]
         shape = self._grid.shape
-        self._source = {(i, j): source[:, i::2, j::2] for i, j in PARITIES}
-        self._along, self._work = Cells(shape, float), np.empty(shape)
+        self._source = {(i, j): padded(source[:, i::2, j::2]) for i, j in PARITIES}
+        self._along = Cells(shape, float)
+        self._work = np.empty(self._along.own[0, 0].shape)
+        self._beyond = shape[0], shape[1] + 1, shape[2] + 1
         for k, values in enumerate(start):
             for (i, j), own in self._along.own.items():
-                own[k] = np.broadcast_to(values, source.shape[1:])[i::2, j::2]
+                inside(own, shape)[k] = np.broadcast_to(values, source.shape[1:])[i::2, j::2]
         for one in _SOLVED:
             self._along.wrap(one)
         self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
         self._balance(self._source)
         self.flow = source.sum(axis=(1, 2))
         for one, links in self._source.items():
-            self.flow -= np.einsum("nxy,nxy->n", links, self._along.own[one])
-        self._residual = {one: self._left(one) for one in _SOLVED}
-        self.flow -= _product(self._residual, self._potential)
-        self.imbalance = _sum(self._residual)
-        self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
+            self.flow -= np.einsum("nx,nx->n", links, self._along.own[one])
+        self._residual = {one: self._left(one, self._source) for one in _SOLVED}
+        self.flow -= self._product(self._residual, self._potential)
+        self.imbalance = self._sum(self._residual)
+        self._right = {one: self._grid.right[one] for one in _SOLVED}
         self._before, self._changes = np.zeros(len(source)), list[Array]()
 
     def _into(self, parity: Offset) -> Array:
@@ -275,11 +287,14 @@ class _Iteration:
             total += np.multiply(link, beside[key], out=self._work)
         return total
 
-    def _left(self, parity: Offset) -> Array:
-        """Return what potentials leave of the balance of cells of a parity, with sources."""
+    def _left(self, parity: Offset, source: Parts | None = None) -> Array:
+        """Return what potentials leave of the balance of cells of a parity, with sources if any."""
         total = self._into(parity)
-        total += self._source[parity]
+        if source is not None:
+            total += source[parity]
         total -= np.multiply(self._grid.diagonal[parity], self._along.own[parity], out=self._work)
+        maps = total.reshape(self._beyond)
+        maps[:, -1] = maps[..., -1] = 0.0
         return total
 
     def _balance(self, source: Parts | None = None) -> None:
@@ -298,30 +313,30 @@ class _Iteration:
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along = self._residual, self._along
-        scale = self.imbalance[:, None, None] + np.finfo(float).tiny
+        scale = self.imbalance[:, None] + np.finfo(float).tiny
         for one, right in self._right.items():
             np.multiply(residual[one], 1.0 / scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
         steps = {one: guess[one] * scale for one in _SOLVED}
-        now = _product(residual, steps)
+        now = self._product(residual, steps)
         again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
         self._before = now
         for one, step in steps.items():
             own = along.own[one]
-            own *= again[:, None, None]
+            own *= again[:, None]
             own += step
             along.wrap(one)
         self._balance()
-        out = {one: self._grid.diagonal[one] * along.own[one] - self._into(one) for one in _SOLVED}
-        power = _product(out, along.own)
+        out = {one: self._left(one) for one in _SOLVED}
+        power = -self._product(out, along.own)
         length = np.divide(now, power, out=np.zeros_like(now), where=power > 0.0)
         for one in _SOLVED:
-            by = length[:, None, None]
+            by = length[:, None]
             self._potential[one] += np.multiply(along.own[one], by, out=self._work)
-            residual[one] -= np.multiply(out[one], by, out=self._work)
+            residual[one] += np.multiply(out[one], by, out=self._work)
         self._changes.append(length * now)
         self.flow = self.flow - self._changes[-1]
-        self.imbalance = _sum(residual)
+        self.imbalance = self._sum(residual)
         last = max(2, len(self._changes) // 4)
         return np.asarray(np.sum(self._changes[-last:], axis=0))
 
@@ -342,26 +357,26 @@ class _Iteration:
         self._balance(self._source)
         found = np.empty((grid.shape[0], 2 * grid.shape[1], 2 * grid.shape[2]))
         for (i, j), values in self._along.own.items():
-            found[:, i::2, j::2] = values
+            found[:, i::2, j::2] = inside(values, grid.shape)
         flow = np.einsum("nxy,nxy,nxy->n", sink, found, found)
         for one in _BETWEEN:  # which all links lead from
             own = self._along.own[one]
             for key, link in grid.links[one].items():
-                drop = np.subtract(own, self._along.beside[one][key], out=self._work)
-                flow += np.einsum("nxy,nxy,nxy->n", link, drop, drop)
+                drop = inside(own - self._along.beside[one][key], grid.shape)
+                flow += np.einsum("nxy,nxy,nxy->n", inside(link, grid.shape), drop, drop)
         for one, source in self._source.items():
             drop = np.subtract(1.0, self._along.own[one], out=self._work)
-            flow += np.einsum("nxy,nxy,nxy->n", source, drop, drop)
-        left = {one: self._left(one) for one in PARITIES}
+            flow += np.einsum("nx,nx,nx->n", source, drop, drop)
+        left = {one: self._left(one, self._source) for one in PARITIES}
         self._along = along
-        return found, flow, _sum(left)
+        return found, flow, self._sum(left)
 
+    @staticmethod
+    def _sum(parts: Parts) -> Array:
+        """Return sums of absolute values, shape (n,)."""
+        return np.asarray(sum(np.abs(one).sum(axis=1) for one in parts.values()))
 
-def _sum(parts: Parts) -> Array:
-    """Return sums of absolute values, shape (n,)."""
-    return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in parts.values()))
-
-
-def _product(first: Parts, second: Parts) -> Array:
-    """Return inner products of values of the cells that are solved for, shape (n,)."""
-    return np.asarray(sum(np.einsum("nxy,nxy->n", first[one], second[one]) for one in _SOLVED))
+    @staticmethod
+    def _product(first: Parts, second: Parts) -> Array:
+        """Return inner products of values of the cells that are solved for, shape (n,)."""
+        return np.asarray(sum(np.einsum("nx,nx->n", first[one], second[one]) for one in _SOLVED))

@@ -20,7 +20,7 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -32,6 +32,7 @@ from patchlaw.support import Array
 
 Offset = tuple[int, int]
 Parts = dict[Offset, NDArray[np.floating]]
+Shape = tuple[int, int, int]
 
 PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
 """Order in which cells are relaxed: those of the first two and of the last two, on the finest grid,
@@ -73,29 +74,46 @@ def _halves(x: int, y: int) -> tuple[Offset, Offset]:
     return (x % 2, y % 2), (x // 2, y // 2)
 
 
+def padded(values: NDArray[Any], dtype: type = float) -> NDArray[np.floating]:
+    """Return maps of cells, shape (n, nx, ny), with a line of 0 at two sides, in one row each."""
+    count, nx, ny = values.shape
+    found = np.zeros((count, nx + 1, ny + 1), dtype)
+    found[:, :nx, :ny] = values
+    return found.reshape(count, -1)
+
+
 class Cells:
     """Values of cells by parity, with a line of those beyond the side that others look at.
+
+    Those of one parity and their neighbours are parts of arrays without strides, at an offset, so
+    that operations take one loop. What they leave in the place of lines is renewed by `wrap`.
 
     Args:
         shape: Directions and cells of one parity along both sides.
         dtype: Type of numbers.
+        values: Values of all cells, shape (n, nx, ny), 0 when not given.
+
+    Attributes:
+        own: Values of cells of each parity, as `padded` ones.
+        beside: Those at an offset from them.
     """
 
-    def __init__(self, shape: tuple[int, ...], dtype: type) -> None:
-        count, nx, ny = shape
-        self._all: Parts = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in PARITIES}
-
-        def seen(parity: int, offset: int, cells: int) -> slice:
-            first = parity if offset == 0 else (offset + 1) // 2
-            return slice(first, first + cells)
-
+    def __init__(self, shape: Shape, dtype: type, values: Array | None = None) -> None:
+        count, nx, ny = self.shape = shape
+        size, wide = count * (nx + 1) * (ny + 1), ny + 1
+        whole = {one: np.zeros(size + wide + 1, dtype) for one in PARITIES}
+        self._all = {one: each[:size].reshape(count, nx + 1, wide) for one, each in whole.items()}
         self.beside: dict[Offset, Parts] = {one: {} for one in PARITIES}
         for one, i, j in product(PARITIES, (-1, 0, 1), (-1, 0, 1)):
-            offset = i, j
+            row, column = (k if to == 0 else (to + 1) // 2 for k, to in zip(one, (i, j), strict=True))
+            first = row * wide + column
             other = _halves(one[0] + i, one[1] + j)[0]
-            cut = (seen(*each) for each in zip(one, offset, (nx, ny), strict=True))
-            self.beside[one][offset] = self._all[other][:, *cut]
+            self.beside[one][i, j] = whole[other][first : first + size].reshape(count, -1)
         self.own = {one: self.beside[one][0, 0] for one in PARITIES}
+        if values is not None:
+            for (i, j), own in self.own.items():
+                inside(own, shape)[:] = values[:, i::2, j::2]
+                self.wrap((i, j))
 
     def wrap(self, parity: Offset) -> None:
         """Renew the line beyond the side."""
@@ -106,12 +124,25 @@ class Cells:
         values[:, :, to] = values[:, :, of]
 
 
-def _both_ways(half: dict[Offset, Parts]) -> dict[Offset, Parts]:
-    """Return all links of cells of each parity, from half of them by offset and parity."""
+def inside(values: NDArray[Any], shape: Shape) -> NDArray[Any]:
+    """Return the maps in an array of `padded` ones, which they share.
+
+    Args:
+        values: See `padded`.
+        shape: Shape of the maps.
+    """
+    count, nx, ny = shape
+    return values.reshape(count, nx + 1, ny + 1)[:, :nx, :ny]
+
+
+def _both_ways(links: Mapping[Offset, Array], dtype: type) -> dict[Offset, Parts]:
+    """Return all links of cells of each parity, which are stored once, from half of them."""
     found: dict[Offset, Parts] = {one: {} for one in PARITIES}
-    for one, ((i, j), parts) in product(PARITIES, half.items()):
-        other, base = _halves(one[0] - i, one[1] - j)
-        found[one] |= {(i, j): parts[one], (-i, -j): shifted(parts[other], base)}
+    for (i, j), values in links.items():
+        count, nx, ny = values.shape
+        cells = Cells((count, nx // 2, ny // 2), dtype, values)
+        for one, seen in found.items():
+            seen |= {(i, j): cells.own[one], (-i, -j): cells.beside[one][-i, -j]}
     return found
 
 
@@ -121,41 +152,60 @@ class _Grid:
     Args:
         links: Links of cells to neighbours by their offset, 2 or 4 of `_HALF`, shape (n, nx, ny).
         diagonal: Sum of all links of a cell.
+
+    Attributes:
+        links: Those of cells of each parity to all neighbours, as `padded` ones, with anything in
+            the lines at their sides.
+        diagonal: Sums of all links of cells of each parity, `padded`.
+        inverse: Their inverses, 0 in closed cells.
+        right: Where to put a right side for the cycle.
+        change: Where a coarser grid reads its right side, and puts what it finds.
     """
 
-    def __init__(self, links: Parts, diagonal: Array) -> None:
-        def split(values: Array) -> Parts:
-            return {(i, j): np.ascontiguousarray(values[:, i::2, j::2]) for i, j in PARITIES}
-
-        self.diagonal, half = split(diagonal), {key: split(one) for key, one in links.items()}
-        self.links = _both_ways(half)
-        self.shape = self.diagonal[0, 0].shape
+    def __init__(self, links: Mapping[Offset, Array], diagonal: Array) -> None:
+        count, nx, ny = diagonal.shape
+        self.shape = shape = count, nx // 2, ny // 2
+        self.diagonal = {(i, j): padded(diagonal[:, i::2, j::2]) for i, j in PARITIES}
+        self.links, low = _both_ways(links, float), _both_ways(links, np.float32)
         self.inverse = {one: self._over(1.0, self.diagonal[one], one) for one in PARITIES}
         self.weights = self._weights(self.inverse)
-        self.found, self._work = Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
+        self.found, rows = Cells(shape, np.float32), self.diagonal[0, 0].shape
+        self._total, self._work = (np.empty(rows, np.float32) for _ in range(2))
+        self.right: Parts = {one: np.zeros(rows, np.float32) for one in PARITIES}
         self._inverse = {one: values.astype(np.float32) for one, values in self.inverse.items()}
         self._low = {
             one: [
-                (_halves(one[0] + key[0], one[1] + key[1])[0], link.astype(np.float32), key)
+                (_halves(one[0] + key[0], one[1] + key[1])[0], link, key)
                 for key, link in seen.items()
             ]
-            for one, seen in self.links.items()
+            for one, seen in low.items()
         }
-        self._low_weights = {
-            one: [(key, weight.astype(np.float32)) for key, weight in self.weights[one].items()]
-            for one in PARITIES
-        }
+        size, wide = rows[0] * rows[1], shape[2] + 1
+        coarse = np.zeros(size + wide + 1, np.float32)
+        self._coarse = coarse[:size].reshape(count, -1, wide)
+        self.change = self._coarse[:, :-1, :-1]
         among = 2 if len(links) == 2 else 1
         self._first, self._last = PARITIES[:among], PARITIES[-among:]
+        self._low_weights = {
+            one: [
+                (coarse[i * wide + j :][:size].reshape(rows), weight.astype(np.float32))
+                for (i, j), weight in self.weights[one].items()
+            ]
+            for one in PARITIES[1:-among]
+        }
+
+    def inside(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the maps of cells of one parity in an array of `padded` ones."""
+        return inside(values, self.shape)
 
     def _over(self, values: Array | float, by: Array, parity: Offset) -> Array:
         """Return values over others in open cells of a parity, 0 in closed ones."""
         is_open = self.diagonal[parity] > _LEAST
-        return np.divide(values, by, out=np.zeros(self.shape), where=is_open)
+        return np.divide(values, by, out=np.zeros(by.shape), where=is_open)
 
     def _weights(self, inverse: Parts) -> dict[Offset, Parts]:
         """Return weights of coarse cells in cells of each parity, by how far they are away."""
-        found: dict[Offset, Parts] = {(0, 0): {(0, 0): np.ones(self.shape)}}
+        found: dict[Offset, Parts] = {(0, 0): {(0, 0): padded(np.ones(self.shape))}}
         for axis, parity in enumerate(((1, 0), (0, 1))):
             links, diagonal = self.links[parity], self.diagonal[parity]
             sides = [
@@ -171,7 +221,8 @@ class _Grid:
             other, base = _halves(1 + key[0], 1 + key[1])
             for coarse, weight in found[other].items():
                 to = base[0] + coarse[0], base[1] + coarse[1]
-                middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * shifted(weight, base)
+                beside = padded(shifted(self.inside(weight), base))
+                middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * beside
         found[1, 1] = middle
         return found
 
@@ -180,22 +231,21 @@ class _Grid:
 
         Nothing flows out of cells of parity (1, 1), whose weights are what balances them.
         """
-        weights = {
-            (one[0] - 2 * key[0], one[1] - 2 * key[1]): shifted(weight, (-key[0], -key[1]))
+        wide = {
+            (one[0] - 2 * i, one[1] - 2 * j): _wide(shifted(self.inside(weight), (-i, -j)))
             for one in PARITIES
-            for key, weight in self.weights[one].items()
-        }  # of each cell of the coarser grid in the cells around it
-        wide = {key: _wide(one) for key, one in weights.items()}
+            for (i, j), weight in self.weights[one].items()
+        }  # weights of each cell of the coarser grid in the cells around it
         found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
         (_, nx, ny), work = self.shape, np.empty(self.shape)
-        for place, weight in weights.items():
+        for place, weight in wide.items():
             one, base = _halves(*place)
             if one == (1, 1):
                 continue
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
             entries = {(0, 0): -self.diagonal[one], **self.links[one]}
             for key, entry in entries.items():
-                value, to = shifted(entry, base), (place[0] + key[0], place[1] + key[1])
+                value, to = shifted(self.inside(entry), base), (place[0] + key[0], place[1] + key[1])
                 for x, y in product(*((0,) if k % 2 == 0 else (-1, 1) for k in to)):
                     i, j = (to[0] - x) // 2, (to[1] - y) // 2
                     if (i, j) in found:
@@ -205,20 +255,20 @@ class _Grid:
                         else:
                             rows[i, j] = value * beside
             for key, row in rows.items():
-                found[key] += np.multiply(weight, row, out=row)
+                found[key] += np.multiply(weight[:, 1:-1, 1:-1], row, out=row)
         return found, -found.pop((0, 0))
 
     def pools(self) -> Pools:
         """Return its pools, with cells in the order of their parities."""
-        count, numbers = self.inverse[0, 0].size, {}
+        count, numbers = int(np.prod(self.shape)), {}
         for k, one in enumerate(PARITIES):
             numbers[one] = np.arange(k * count, (k + 1) * count).reshape(self.shape)
         heads, links = [], []
         for key in self.links[0, 0]:
-            beside = ((one, _halves(one[0] + key[0], one[1] + key[1])) for one in PARITIES)
-            heads.append(_flat({one: shifted(numbers[of], base) for one, (of, base) in beside}))
-            links.append(_flat({one: self.links[one][key] for one in PARITIES}))
-        diagonal = _flat(self.diagonal)
+            beside = (_halves(one[0] + key[0], one[1] + key[1]) for one in PARITIES)
+            heads.append(np.concatenate([shifted(numbers[of], base).ravel() for of, base in beside]))
+            links.append(self.flat({one: self.links[one][key] for one in PARITIES}))
+        diagonal = self.flat(self.diagonal)
         open_links = np.where(diagonal > _LEAST, diagonal, 0.0)
         return Pools(np.array(heads), np.array(links), open_links)
 
@@ -229,16 +279,25 @@ class _Grid:
             for values in (self.links, self.diagonal, self.inverse):
                 values.clear()
 
+    def flat(self, parts: Parts) -> NDArray[np.floating]:
+        """Return values of cells in the order of their parities."""
+        return np.concatenate([self.inside(parts[one]).ravel() for one in PARITIES])
+
+    def put(self, values: Array, parts: Parts) -> None:
+        """Write values of cells, in the order of their parities, into parts."""
+        for one, part in zip(PARITIES, np.split(values, len(PARITIES)), strict=True):
+            self.inside(parts[one])[:] = part.reshape(self.shape)
+
     def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
-        """Return what flows into cells of a parity from others, themselves at 0."""
-        total, beside = None, self.found.beside[parity]
+        """Return what flows into cells of a parity from others, overwritten next time."""
+        beside, out = self.found.beside[parity], self._total
         for other, link, key in self._low[parity]:
             if other in others:
-                if total is None:
-                    total = link * beside[key]
-                else:
-                    total += np.multiply(link, beside[key], out=self._work)
-        return total
+                np.multiply(link, beside[key], out=out)
+                if out is self._work:
+                    self._total += out
+                out = self._work
+        return None if out is self._total else self._total
 
     def _relax(self, right: Parts, parity: Offset, others: Sequence[Offset]) -> None:
         """Solve for the cells of a parity, with those of others as they are."""
@@ -247,34 +306,39 @@ class _Grid:
         np.multiply(total, self._inverse[parity], out=self.found.own[parity])
         self.found.wrap(parity)
 
-    def before(self, right: Parts) -> NDArray[np.floating]:
-        """Relax all cells once, from zero, and return the residual of the next coarser grid."""
+    def before(self, right: Parts) -> None:
+        """Relax all cells once, from zero, and put the residual where the coarser grid reads it."""
         done: list[Offset] = []
         for parity in right:
             self._relax(right, parity, () if parity in self._first else done)
             done.append(parity)
-        coarse = None
+        coarse = self._coarse
         for count, parity in enumerate(PARITIES[: -len(self._last)]):
             residual = self._from(parity, PARITIES[count + 1 :])  # as later ones came after it
             assert residual is not None
-            if coarse is None:
-                coarse = residual
+            if parity == (0, 0):
+                coarse[:] = residual.reshape(coarse.shape)
+                coarse[:, -1] = coarse[..., -1] = 0.0
                 continue
-            for (i, j), weight in self._low_weights[parity]:
-                coarse += shifted(np.multiply(weight, residual, out=self._work), (-i, -j))
-        assert coarse is not None
-        return coarse
+            for beside, weight in self._low_weights[parity]:
+                beside += np.multiply(weight, residual, out=self._work)
+        coarse[:, 0] += coarse[:, -1]
+        coarse[..., 0] += coarse[..., -1]
 
-    def after(self, right: Parts, change: NDArray[np.floating]) -> None:
+    def after(self, right: Parts) -> None:
         """Add the change that a coarser grid found, and relax all cells once in reverse order."""
-        wide, (_, nx, ny) = _wide(change), self.shape
+        coarse = self._coarse
+        coarse[:, -1] = coarse[:, 0]
+        coarse[..., -1] = coarse[..., 0]
         for parity in PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
             own = self.found.own[parity]
             if parity not in right:
                 own[:] = 0.0
-            for (i, j), weight in self._low_weights[parity]:
-                beside = wide[:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
-                own += np.multiply(weight, beside, out=self._work)
+            if parity == (0, 0):
+                own += coarse.reshape(own.shape)
+            else:
+                for beside, weight in self._low_weights[parity]:
+                    own += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
         for parity in reversed(right):
             self._relax(right, parity, PARITIES)
@@ -313,33 +377,23 @@ class Cycle:
         """
         grid, pools = self.grids[depth], self._pools if depth == _WITH_POOLS else None
         if pools:
-            changes, left = pools.changes(_flat(right))
-            self._put(left, right)
-        coarse = grid.before(right)
-        change = np.empty_like(coarse)
+            changes, left = pools.changes(grid.flat(right))
+            grid.put(left, right)
+        grid.before(right)
         if depth + 1 < len(self.grids):
-            parts = {(i, j): np.ascontiguousarray(coarse[:, i::2, j::2]) for i, j in PARITIES}
-            for (i, j), part in self(parts, depth + 1).items():
-                change[:, i::2, j::2] = part
+            coarser = self.grids[depth + 1]
+            for (i, j), part in coarser.right.items():
+                coarser.inside(part)[:] = grid.change[:, i::2, j::2]
+            for (i, j), part in self(coarser.right, depth + 1).items():
+                grid.change[:, i::2, j::2] = coarser.inside(part)
         else:
-            flat = coarse.reshape(len(coarse), -1, 1)
-            change[:] = (self._inverse @ flat).reshape(coarse.shape)
-        grid.after(right, change)
+            flat = grid.change.reshape(len(grid.change), -1, 1)
+            grid.change[:] = (self._inverse @ flat).reshape(grid.change.shape)
+        grid.after(right)
         found = grid.found.own
         if pools:
-            self._put(pools.balanced(_flat(found), changes), found)
+            grid.put(pools.balanced(grid.flat(found), changes), found)
         return found
-
-    @staticmethod
-    def _put(values: Array, parts: Parts) -> None:
-        """Write values of cells, in the order of their parities, into parts."""
-        for one, part in zip(PARITIES, np.split(values, len(PARITIES)), strict=True):
-            parts[one][:] = part.reshape(parts[one].shape)
-
-
-def _flat(parts: Parts) -> NDArray[np.floating]:
-    """Return values of cells in the order of their parities."""
-    return np.concatenate([parts[one].ravel() for one in PARITIES])
 
 
 def _inverse(links: Parts, diagonal: Array) -> Array:
