@@ -20,7 +20,8 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -95,29 +96,45 @@ class Cells:
 
     Attributes:
         own: Values of cells of each parity, as `padded` ones.
-        beside: Those at an offset from them.
     """
 
     def __init__(self, shape: Shape, dtype: type, values: Array | None = None) -> None:
-        count, nx, ny = self.shape = shape
-        size, wide = count * (nx + 1) * (ny + 1), ny + 1
-        whole = {one: np.zeros(size + wide + 1, dtype) for one in PARITIES}
-        self._all = {one: each[:size].reshape(count, nx + 1, wide) for one, each in whole.items()}
-        self.beside: dict[Offset, Parts] = {one: {} for one in PARITIES}
-        for one, i, j in product(PARITIES, (-1, 0, 1), (-1, 0, 1)):
-            row, column = (k if to == 0 else (to + 1) // 2 for k, to in zip(one, (i, j), strict=True))
-            first = row * wide + column
-            other = _halves(one[0] + i, one[1] + j)[0]
-            self.beside[one][i, j] = whole[other][first : first + size].reshape(count, -1)
-        self.own = {one: self.beside[one][0, 0] for one in PARITIES}
+        count, nx, ny = shape
+        self._shape, self._size, self._wide = shape, count * (nx + 1) * (ny + 1), ny + 1
+        self._whole = np.zeros((len(PARITIES), self._size + ny + 2), dtype)
+        self._maps = {
+            one: each[: self._size].reshape(count, nx + 1, ny + 1)
+            for one, each in zip(PARITIES, self._whole, strict=True)
+        }
+        self.own = {one: self.seen(one, (0, 0)) for one in PARITIES}
         if values is not None:
             for (i, j), own in self.own.items():
                 inside(own, shape)[:] = values[:, i::2, j::2]
                 self.wrap((i, j))
 
+    def seen(self, parity: Offset, offset: Offset) -> NDArray[Any]:
+        """Return values at an offset from cells of a parity, as `padded` ones."""
+        ways = zip(parity, offset, strict=True)
+        row, column = (one if to == 0 else (to + 1) // 2 for one, to in ways)
+        other = PARITIES.index(_halves(parity[0] + offset[0], parity[1] + offset[1])[0])
+        first = row * self._wide + column
+        return self._whole[other, first : first + self._size].reshape(self._shape[0], -1)
+
+    @cached_property
+    def beside(self) -> dict[Offset, Parts]:
+        """What `seen` returns, by parity and offset."""
+        offsets = list(product((-1, 0, 1), (-1, 0, 1)))
+        return {one: {key: self.seen(one, key) for key in offsets} for one in PARITIES}
+
+    def single(self) -> Cells:
+        """Return the same in single precision."""
+        found = Cells(self._shape, np.float32)
+        found._whole[:] = self._whole
+        return found
+
     def wrap(self, parity: Offset) -> None:
         """Renew the line beyond the side."""
-        values = self._all[parity]
+        values = self._maps[parity]
         to, of = (0, -1) if parity[0] else (-1, 0)
         values[:, to] = values[:, of]
         to, of = (0, -1) if parity[1] else (-1, 0)
@@ -135,23 +152,12 @@ def inside(values: NDArray[Any], shape: Shape) -> NDArray[Any]:
     return values.reshape(count, nx + 1, ny + 1)[:, :nx, :ny]
 
 
-def _both_ways(links: Mapping[Offset, Array], dtype: type) -> dict[Offset, Parts]:
-    """Return all links of cells of each parity, which are stored once, from half of them."""
-    found: dict[Offset, Parts] = {one: {} for one in PARITIES}
-    for (i, j), values in links.items():
-        count, nx, ny = values.shape
-        cells = Cells((count, nx // 2, ny // 2), dtype, values)
-        for one, seen in found.items():
-            seen |= {(i, j): cells.own[one], (-i, -j): cells.beside[one][-i, -j]}
-    return found
-
-
 class _Grid:
     """One grid of the hierarchy.
 
     Args:
-        links: Links of cells to neighbours by their offset, 2 or 4 of `_HALF`, shape (n, nx, ny).
-        diagonal: Sum of all links of a cell.
+        links: Links of cells to neighbours by their offset, 2 or 4 of `_HALF`, and at (0, 0) the
+            sum of all links of a cell, shape (n, nx, ny). Emptied, which frees them.
 
     Attributes:
         links: Those of cells of each parity to all neighbours, as `padded` ones, with anything in
@@ -162,37 +168,63 @@ class _Grid:
         change: Where a coarser grid reads its right side, and puts what it finds.
     """
 
-    def __init__(self, links: Mapping[Offset, Array], diagonal: Array) -> None:
-        count, nx, ny = diagonal.shape
+    def __init__(self, links: Parts) -> None:
+        count, nx, ny = links[0, 0].shape
         self.shape = shape = count, nx // 2, ny // 2
-        self.diagonal = {(i, j): padded(diagonal[:, i::2, j::2]) for i, j in PARITIES}
-        self.links, low = _both_ways(links, float), _both_ways(links, np.float32)
+        sums = links.pop((0, 0))
+        self.diagonal = {(i, j): padded(sums[:, i::2, j::2]) for i, j in PARITIES}
+        del sums
+        among = 2 if len(links) == 2 else 1
+        self._first, self._last = PARITIES[:among], PARITIES[-among:]
+        self._links = [(key, Cells(shape, float, links.pop(key))) for key in list(links)]
+        self.links = self._both_ways()
         self.inverse = {one: self._over(1.0, self.diagonal[one], one) for one in PARITIES}
         self.weights = self._weights(self.inverse)
-        self.found, rows = Cells(shape, np.float32), self.diagonal[0, 0].shape
-        self._total, self._work = (np.empty(rows, np.float32) for _ in range(2))
-        self.right: Parts = {one: np.zeros(rows, np.float32) for one in PARITIES}
-        self._inverse = {one: values.astype(np.float32) for one, values in self.inverse.items()}
-        self._low = {
+
+    def relaxes_alone(self, entirely: bool) -> None:
+        """Let it relax, in single precision, and free what only coarser grids are made from.
+
+        Args:
+            entirely: Whether to free what iterations on the finest grid and pools need, too.
+        """
+        rows, (count, nx, ny), among = self.diagonal[0, 0].shape, self.shape, len(self._first)
+        size, coarse = rows[0] * rows[1], np.zeros(rows[0] * rows[1] + ny + 2, np.float32)
+        self._coarse = coarse[:size].reshape(count, nx + 1, ny + 1)
+        self.change = self._coarse[:, :-1, :-1]
+        self._weights_of = {
+            one: [
+                (coarse[i * (ny + 1) + j :][:size].reshape(rows), weight.astype(np.float32))
+                for (i, j), weight in self.weights[one].items()
+            ]
+            for one in PARITIES[1:-among]
+        }
+        self.weights.clear()
+        relaxed = PARITIES[-2:] if among == 2 else PARITIES
+        self._inverse = {one: self.inverse[one].astype(np.float32) for one in relaxed}
+        self.right: Parts = {one: np.zeros(rows, np.float32) for one in relaxed}
+        low = self._both_ways(single=True)
+        self._from_others = {
             one: [
                 (_halves(one[0] + key[0], one[1] + key[1])[0], link, key)
                 for key, link in seen.items()
             ]
             for one, seen in low.items()
         }
-        size, wide = rows[0] * rows[1], shape[2] + 1
-        coarse = np.zeros(size + wide + 1, np.float32)
-        self._coarse = coarse[:size].reshape(count, -1, wide)
-        self.change = self._coarse[:, :-1, :-1]
-        among = 2 if len(links) == 2 else 1
-        self._first, self._last = PARITIES[:among], PARITIES[-among:]
-        self._low_weights = {
-            one: [
-                (coarse[i * wide + j :][:size].reshape(rows), weight.astype(np.float32))
-                for (i, j), weight in self.weights[one].items()
-            ]
-            for one in PARITIES[1:-among]
-        }
+        self.found = Cells(self.shape, np.float32)
+        self._total, self._work = (np.empty(rows, np.float32) for _ in range(2))
+        if entirely:
+            for values in (self.links, self.diagonal, self.inverse):
+                values.clear()
+        self._links.clear()
+
+    def _both_ways(self, *, single: bool = False) -> dict[Offset, Parts]:
+        """Return all links of cells of each parity."""
+        found: dict[Offset, Parts] = {one: {} for one in PARITIES}
+        for key, cells in self._links:
+            values, other = cells.single() if single else cells, (-key[0], -key[1])
+            for one, seen in found.items():
+                seen |= {key: values.own[one], other: values.seen(one, other)}
+        return found
 
     def inside(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the maps of cells of one parity in an array of `padded` ones."""
@@ -226,8 +258,8 @@ class _Grid:
         found[1, 1] = middle
         return found
 
-    def coarser(self) -> tuple[Parts, Array]:
-        """Return links and diagonal of the next coarser grid.
+    def coarser(self) -> Parts:
+        """Return links of the next coarser grid, as it takes them.
 
         Nothing flows out of cells of parity (1, 1), whose weights are what balances them.
         """
@@ -256,7 +288,8 @@ class _Grid:
                             rows[i, j] = value * beside
             for key, row in rows.items():
                 found[key] += np.multiply(weight[:, 1:-1, 1:-1], row, out=row)
-        return found, -found.pop((0, 0))
+        np.negative(found[0, 0], out=found[0, 0])
+        return found
 
     def pools(self) -> Pools:
         """Return its pools, with cells in the order of their parities."""
@@ -272,13 +305,6 @@ class _Grid:
         open_links = np.where(diagonal > _LEAST, diagonal, 0.0)
         return Pools(np.array(heads), np.array(links), open_links)
 
-    def relaxes_alone(self, entirely: bool) -> None:
-        """Free what only coarser grids are made from, and iterations on the finest one need."""
-        self.weights.clear()
-        if entirely:
-            for values in (self.links, self.diagonal, self.inverse):
-                values.clear()
-
     def flat(self, parts: Parts) -> NDArray[np.floating]:
         """Return values of cells in the order of their parities."""
         return np.concatenate([self.inside(parts[one]).ravel() for one in PARITIES])
@@ -291,7 +317,7 @@ class _Grid:
     def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
         """Return what flows into cells of a parity from others, overwritten next time."""
         beside, out = self.found.beside[parity], self._total
-        for other, link, key in self._low[parity]:
+        for other, link, key in self._from_others[parity]:
             if other in others:
                 np.multiply(link, beside[key], out=out)
                 if out is self._work:
@@ -320,7 +346,7 @@ class _Grid:
                 coarse[:] = residual.reshape(coarse.shape)
                 coarse[:, -1] = coarse[..., -1] = 0.0
                 continue
-            for beside, weight in self._low_weights[parity]:
+            for beside, weight in self._weights_of[parity]:
                 beside += np.multiply(weight, residual, out=self._work)
         coarse[:, 0] += coarse[:, -1]
         coarse[..., 0] += coarse[..., -1]
@@ -337,7 +363,7 @@ class _Grid:
             if parity == (0, 0):
                 own += coarse.reshape(own.shape)
             else:
-                for beside, weight in self._low_weights[parity]:
+                for beside, weight in self._weights_of[parity]:
                     own += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
         for parity in reversed(right):
@@ -349,17 +375,17 @@ class Cycle:
 
     Args:
         links: See `_Grid`.
-        diagonal: Likewise.
     """
 
-    def __init__(self, links: Parts, diagonal: Array) -> None:
-        self.grids = [_Grid(links, diagonal)]
+    def __init__(self, links: Parts) -> None:
+        self.grids = [_Grid(links)]
         self._pools: Pools | None = None
         while max(self.grids[-1].shape[1:]) > COARSEST:
             coarser = self.grids[-1].coarser()
             self.grids[-1].relaxes_alone(len(self.grids) - 1 not in (0, _WITH_POOLS))
-            self.grids.append(_Grid(*coarser))
-        self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
+            self.grids.append(_Grid(coarser))
+        self._inverse = _inverse(self.grids[-1].coarser()).astype(np.float32)
+        self.grids[-1].relaxes_alone(len(self.grids) - 1 not in (0, _WITH_POOLS))
 
     def with_pools(self) -> bool:
         """Let cycles correct pools, too; return whether they do so from here on."""
@@ -396,8 +422,9 @@ class Cycle:
         return found
 
 
-def _inverse(links: Parts, diagonal: Array) -> Array:
-    """Return inverses of matrices of small grids, shape (n, m, m)."""
+def _inverse(links: Parts) -> Array:
+    """Return inverses of matrices of small grids, shape (n, m, m), from what `_Grid` takes."""
+    diagonal = links.pop((0, 0))
     count, size = len(diagonal), diagonal[0].size
     index, flat = np.arange(size).reshape(diagonal.shape[1:]), diagonal.reshape(count, -1)
     is_open, matrix = flat > _LEAST, np.zeros((count, size, size))
