@@ -97,11 +97,11 @@ def cell_flows(
             return None
         flows[some] = solved[1] * size**3
         for k, potential in zip(some, solved[0], strict=True):
-            found[k] = np.where(flowing[k], np.clip(potential, 0.0, 1.0), levels[k][pools])
-    for k in range(len(axes)):
-        if k not in found:
-            found[k] = levels[k][pools]
-    return [(found[k], flow) for k, flow in enumerate(flows.tolist())]
+            found[k] = np.clip(potential, 0.0, 1.0, out=potential)
+            np.copyto(potential, levels[k][pools], where=~flowing[k])
+    return [
+        (found[k] if k in found else levels[k][pools], flow) for k, flow in enumerate(flows.tolist())
+    ]
 
 
 def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
@@ -329,14 +329,13 @@ class _Iteration:
         for one, right in self._right.items():
             np.multiply(residual[one], 1.0 / scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
-        steps = {one: guess[one] * scale for one in _SOLVED}
-        now = self._product(residual, steps)
+        now = self._product(residual, guess) * scale[:, 0]
         again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
         self._before = now
-        for one, step in steps.items():
+        for one in _SOLVED:
             own = along.own[one]
             own *= again[:, None]
-            own += step
+            own += np.multiply(guess[one], scale, out=self._work)
             along.wrap(one)
         self._balance()
         out = {one: self._left(one) for one in _SOLVED}
@@ -355,11 +354,12 @@ class _Iteration:
     def found(self) -> tuple[Array, Array, Array]:
         """Return the potential of all cells, the power it dissipates, and the imbalance it leaves.
 
+        Iterations end by that.
+
         Returns:
             Shapes (n, nx, ny), (n,) and (n,).
         """
-        grid, along = self._grid, self._along
-        self._along = Cells(grid.shape, float)
+        grid = self._grid
         for one, values in self._potential.items():
             self._along.own[one][:] = values
             self._along.wrap(one)
@@ -376,9 +376,8 @@ class _Iteration:
             for key, link in grid.links[one].items():
                 drop = inside(own - self._along.beside[one][key], grid.shape)
                 flow += np.einsum("nxy,nxy,nxy->n", inside(link, grid.shape), drop, drop)
-        left = {one: self._left(one, with_source=True) for one in PARITIES}
-        self._along = along
-        return found, flow, self._sum(left)
+        parts = ({one: self._left(one, with_source=True)} for one in PARITIES)
+        return found, flow, np.asarray(sum(map(self._sum, parts)))
 
     @staticmethod
     def _sum(parts: Parts) -> Array:

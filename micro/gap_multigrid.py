@@ -293,17 +293,20 @@ class _Grid:
 
     def pools(self) -> Pools:
         """Return its pools, with cells in the order of their parities."""
-        count, numbers = int(np.prod(self.shape)), {}
-        for k, one in enumerate(PARITIES):
-            numbers[one] = np.arange(k * count, (k + 1) * count).reshape(self.shape)
-        heads, links = [], []
-        for key in self.links[0, 0]:
-            beside = (_halves(one[0] + key[0], one[1] + key[1]) for one in PARITIES)
-            heads.append(np.concatenate([shifted(numbers[of], base).ravel() for of, base in beside]))
-            links.append(self.flat({one: self.links[one][key] for one in PARITIES}))
+        count = np.prod(self.shape)
+        numbers = {
+            one: np.arange(k * count, (k + 1) * count, dtype=np.intc).reshape(self.shape)
+            for k, one in enumerate(PARITIES)
+        }
+        keys = list(self.links[0, 0])
+        heads = np.empty((len(keys), len(PARITIES), count), np.intc)
+        for (k, key), (m, one) in product(enumerate(keys), enumerate(PARITIES)):
+            of, base = _halves(one[0] + key[0], one[1] + key[1])
+            heads[k, m] = shifted(numbers[of], base).ravel()
+        links = np.array([self.flat({one: self.links[one][key] for one in PARITIES}) for key in keys])
         diagonal = self.flat(self.diagonal)
         open_links = np.where(diagonal > _LEAST, diagonal, 0.0)
-        return Pools(np.array(heads), np.array(links), open_links)
+        return Pools(heads.reshape(len(keys), -1), links, open_links)
 
     def flat(self, parts: Parts) -> NDArray[np.floating]:
         """Return values of cells in the order of their parities."""
