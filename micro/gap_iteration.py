@@ -86,8 +86,8 @@ def cell_flows(
         by_pool[0] = np.nan
         levels.append(by_pool)
         flowing.append(np.isin(joined, through[through > 0])[pools])
-    found: dict[int, Array] = {}
     flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    found = {k: one[pools] for k, one in enumerate(levels) if k not in ways}
     for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
         maps = [_links(gap / size * flowing[k], lengths, axes[k], periodic) for k in some]
         ends = [one.pop() for one in maps]
@@ -99,9 +99,7 @@ def cell_flows(
         for k, potential in zip(some, solved[0], strict=True):
             found[k] = np.clip(potential, 0.0, 1.0, out=potential)
             np.copyto(potential, levels[k][pools], where=~flowing[k])
-    return [
-        (found[k] if k in found else levels[k][pools], flow) for k, flow in enumerate(flows.tolist())
-    ]
+    return [(found[k], flow) for k, flow in enumerate(flows.tolist())]
 
 
 def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
@@ -164,7 +162,8 @@ def potentials(
     parts[0, 0] = sum(link + shifted(link, (-i, -j)) for (i, j), link in parts.items())
     for sums, axis, one in zip(parts[0, 0], axes, ends, strict=True):
         np.moveaxis(sums, axis, 0)[[0, -1]] += one
-    iteration = _Iteration(cycle := Cycle(parts), ends, axes, start)
+    cycle = Cycle(parts)
+    iteration = _Iteration(cycle, list(zip(ends, axes, strict=True)), start)
     most, worst = _IMBALANCE * np.sqrt(tolerance), list[float]()
     for count in range(min(_MOST_ITERATIONS, fewest)):
         changes = iteration.step()
@@ -248,8 +247,7 @@ class _Iteration:
 
     Args:
         cycle: Preconditioner, whose finest grid is the problem.
-        ends: See `potentials`.
-        axes: Likewise.
+        ends: For each direction links to terminals and its axis, see `potentials`.
         start: Potentials to begin from, for each direction, of shapes that extend to (nx, ny).
 
     Attributes:
@@ -258,12 +256,9 @@ class _Iteration:
             that adds up over iterations, shape (n,).
     """
 
-    def __init__(
-        self, cycle: Cycle, ends: Sequence[Array], axes: Sequence[int], start: Sequence[Array]
-    ) -> None:
-        self._cycle, self._grid = cycle, cycle.grids[0]
+    def __init__(self, cycle: Cycle, ends: list[tuple[Array, int]], start: Sequence[Array]) -> None:
+        self._cycle, self._grid, self._ends = cycle, cycle.grids[0], ends
         shape = self._grid.shape
-        self._ends = list(zip(ends, axes, strict=True))
         self._along = Cells(shape, float)
         self._work = np.empty(self._along.own[0, 0].shape)
         self._beyond = shape[0], shape[1] + 1, shape[2] + 1
@@ -274,7 +269,7 @@ class _Iteration:
             self._along.wrap(one)
         self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
         self._balance(with_source=True)
-        self.flow = np.array([one[0].sum() for one in ends])
+        self.flow: Array = np.array([one[0].sum() for one, _ in ends])
         for one, own in self._along.own.items():
             for k, links, cells in self._beside_source(one, own):
                 self.flow[k] -= links @ cells
@@ -292,12 +287,12 @@ class _Iteration:
         for key, link in links:
             total += np.multiply(link, beside[key], out=self._work)
         if with_source:
-            for _, links, cells in self._beside_source(parity, total):
-                cells += links
+            for _, terminals, cells in self._beside_source(parity, total):
+                cells += terminals
         return total
 
     def _beside_source(self, parity: Offset, values: Array) -> Iterator[tuple[int, Array, Array]]:
-        """Yield directions, links of cells of a parity to their sources, and values of the cells."""
+        """Yield directions, links of cells of a parity to sources, and values of these cells."""
         for k, (ends, axis) in enumerate(self._ends):
             if parity[axis] == 0:
                 cells = np.moveaxis(inside(values, self._grid.shape)[k], axis, 0)[0]
@@ -345,7 +340,7 @@ class _Iteration:
             by = length[:, None]
             self._potential[one] += np.multiply(along.own[one], by, out=self._work)
             residual[one] += np.multiply(out[one], by, out=self._work)
-        self._changes.append(length * now)
+        self._changes.append(np.asarray(length * now))
         self.flow = self.flow - self._changes[-1]
         self.imbalance = self._sum(residual)
         last = max(2, len(self._changes) // 4)

@@ -75,10 +75,10 @@ def _halves(x: int, y: int) -> tuple[Offset, Offset]:
     return (x % 2, y % 2), (x // 2, y // 2)
 
 
-def padded(values: NDArray[Any], dtype: type = float) -> NDArray[np.floating]:
+def padded(values: Array) -> Array:
     """Return maps of cells, shape (n, nx, ny), with a line of 0 at two sides, in one row each."""
     count, nx, ny = values.shape
-    found = np.zeros((count, nx + 1, ny + 1), dtype)
+    found = np.zeros((count, nx + 1, ny + 1))
     found[:, :nx, :ny] = values
     return found.reshape(count, -1)
 
@@ -101,11 +101,8 @@ class Cells:
     def __init__(self, shape: Shape, dtype: type, values: Array | None = None) -> None:
         count, nx, ny = shape
         self._shape, self._size, self._wide = shape, count * (nx + 1) * (ny + 1), ny + 1
-        self._whole = np.zeros((len(PARITIES), self._size + ny + 2), dtype)
-        self._maps = {
-            one: each[: self._size].reshape(count, nx + 1, ny + 1)
-            for one, each in zip(PARITIES, self._whole, strict=True)
-        }
+        self._whole: NDArray[Any] = np.zeros((len(PARITIES), self._size + ny + 2), dtype)
+        self._maps = self._whole[:, : self._size].reshape(-1, count, nx + 1, ny + 1)
         self.own = {one: self.seen(one, (0, 0)) for one in PARITIES}
         if values is not None:
             for (i, j), own in self.own.items():
@@ -117,8 +114,8 @@ class Cells:
         ways = zip(parity, offset, strict=True)
         row, column = (one if to == 0 else (to + 1) // 2 for one, to in ways)
         other = PARITIES.index(_halves(parity[0] + offset[0], parity[1] + offset[1])[0])
-        first = row * self._wide + column
-        return self._whole[other, first : first + self._size].reshape(self._shape[0], -1)
+        values = self._whole[other, row * self._wide + column :]
+        return values[: self._size].reshape(self._shape[0], -1)
 
     @cached_property
     def beside(self) -> dict[Offset, Parts]:
@@ -134,7 +131,7 @@ class Cells:
 
     def wrap(self, parity: Offset) -> None:
         """Renew the line beyond the side."""
-        values = self._maps[parity]
+        values = self._maps[PARITIES.index(parity)]
         to, of = (0, -1) if parity[0] else (-1, 0)
         values[:, to] = values[:, of]
         to, of = (0, -1) if parity[1] else (-1, 0)
@@ -188,7 +185,8 @@ class _Grid:
             entirely: Whether to free what iterations on the finest grid and pools need, too.
         """
         rows, (count, nx, ny), among = self.diagonal[0, 0].shape, self.shape, len(self._first)
-        size, coarse = rows[0] * rows[1], np.zeros(rows[0] * rows[1] + ny + 2, np.float32)
+        size = rows[0] * rows[1]
+        coarse: NDArray[Any] = np.zeros(size + ny + 2, np.float32)
         self._coarse = coarse[:size].reshape(count, nx + 1, ny + 1)
         self.change = self._coarse[:, :-1, :-1]
         self._weights_of = {
@@ -202,13 +200,9 @@ class _Grid:
         relaxed = PARITIES[-2:] if among == 2 else PARITIES
         self._inverse = {one: self.inverse[one].astype(np.float32) for one in relaxed}
         self.right: Parts = {one: np.zeros(rows, np.float32) for one in relaxed}
-        low = self._both_ways(single=True)
         self._from_others = {
-            one: [
-                (_halves(one[0] + key[0], one[1] + key[1])[0], link, key)
-                for key, link in seen.items()
-            ]
-            for one, seen in low.items()
+            one: [(_halves(one[0] + i, one[1] + j)[0], link, (i, j)) for (i, j), link in seen]
+            for one, seen in ((one, s.items()) for one, s in self._both_ways(single=True).items())
         }
         self.found = Cells(self.shape, np.float32)
         self._total, self._work = (np.empty(rows, np.float32) for _ in range(2))
@@ -277,7 +271,8 @@ class _Grid:
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
             entries = {(0, 0): -self.diagonal[one], **self.links[one]}
             for key, entry in entries.items():
-                value, to = shifted(self.inside(entry), base), (place[0] + key[0], place[1] + key[1])
+                value = shifted(self.inside(entry), base)
+                to = place[0] + key[0], place[1] + key[1]
                 for x, y in product(*((0,) if k % 2 == 0 else (-1, 1) for k in to)):
                     i, j = (to[0] - x) // 2, (to[1] - y) // 2
                     if (i, j) in found:
@@ -293,20 +288,20 @@ class _Grid:
 
     def pools(self) -> Pools:
         """Return its pools, with cells in the order of their parities."""
-        count = np.prod(self.shape)
-        numbers = {
-            one: np.arange(k * count, (k + 1) * count, dtype=np.intc).reshape(self.shape)
-            for k, one in enumerate(PARITIES)
-        }
-        keys = list(self.links[0, 0])
-        heads = np.empty((len(keys), len(PARITIES), count), np.intc)
-        for (k, key), (m, one) in product(enumerate(keys), enumerate(PARITIES)):
+        count, links = int(np.prod(self.shape)), self.links
+        each = np.arange(len(PARITIES) * count, dtype=np.intc).reshape(-1, *self.shape)
+        numbers = dict(zip(PARITIES, each, strict=True))
+
+        def beside(one: Offset, key: Offset) -> NDArray[Any]:
             of, base = _halves(one[0] + key[0], one[1] + key[1])
-            heads[k, m] = shifted(numbers[of], base).ravel()
-        links = np.array([self.flat({one: self.links[one][key] for one in PARITIES}) for key in keys])
+            return shifted(numbers[of], base)
+
+        keys = list(links[0, 0])
+        heads = np.array([[beside(one, key) for one in PARITIES] for key in keys])
+        widths = np.array([self.flat({one: links[one][key] for one in PARITIES}) for key in keys])
         diagonal = self.flat(self.diagonal)
         open_links = np.where(diagonal > _LEAST, diagonal, 0.0)
-        return Pools(heads.reshape(len(keys), -1), links, open_links)
+        return Pools(heads.reshape(widths.shape), widths, open_links)
 
     def flat(self, parts: Parts) -> NDArray[np.floating]:
         """Return values of cells in the order of their parities."""
