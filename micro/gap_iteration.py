@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from patchlaw.micro.gap_multigrid import (
-    COARSEST,
-    PARITIES,
-    Cells,
-    Cycle,
-    Offset,
-    Parts,
-    inside,
-    shifted,
-)
+from patchlaw.micro.gap_multigrid import COARSEST, PARITIES, Cells, Cycle, Offset, Parts, shifted
 from patchlaw.support import Array
 
 _BETWEEN, _SOLVED = PARITIES[:2], PARITIES[2:]
@@ -264,7 +255,7 @@ class _Iteration:
         self._beyond = shape[0], shape[1] + 1, shape[2] + 1
         for k, values in enumerate(start):
             for (i, j), own in self._along.own.items():
-                inside(own, shape)[k] = values[i % len(values) :: 2, j % values.shape[1] :: 2]
+                self._grid.inside(own)[k] = values[i % len(values) :: 2, j % values.shape[1] :: 2]
         for one in _SOLVED:
             self._along.wrap(one)
         self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
@@ -295,7 +286,7 @@ class _Iteration:
         """Yield directions, links of cells of a parity to sources, and values of these cells."""
         for k, (ends, axis) in enumerate(self._ends):
             if parity[axis] == 0:
-                cells = np.moveaxis(inside(values, self._grid.shape)[k], axis, 0)[0]
+                cells = np.moveaxis(self._grid.inside(values)[k], axis, 0)[0]
                 yield k, ends[0, parity[1 - axis] :: 2], cells
 
     def _left(self, parity: Offset, *, with_source: bool = False) -> Array:
@@ -361,7 +352,7 @@ class _Iteration:
         self._balance(with_source=True)
         found = np.empty((grid.shape[0], 2 * grid.shape[1], 2 * grid.shape[2]))
         for (i, j), values in self._along.own.items():
-            found[:, i::2, j::2] = inside(values, grid.shape)
+            found[:, i::2, j::2] = grid.inside(values)
         flow = np.zeros(len(found))
         for k, (ends, axis) in enumerate(self._ends):
             first, last = np.moveaxis(found[k], axis, 0)[[0, -1]]
@@ -369,8 +360,8 @@ class _Iteration:
         for one in _BETWEEN:  # which all links lead from
             own = self._along.own[one]
             for key, link in grid.links[one].items():
-                drop = inside(own - self._along.beside[one][key], grid.shape)
-                flow += np.einsum("nxy,nxy,nxy->n", inside(link, grid.shape), drop, drop)
+                drop = grid.inside(own - self._along.beside[one][key])
+                flow += np.einsum("nxy,nxy,nxy->n", grid.inside(link), drop, drop)
         parts = ({one: self._left(one, with_source=True)} for one in PARITIES)
         return found, flow, np.asarray(sum(map(self._sum, parts)))
 
