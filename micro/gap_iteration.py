@@ -10,7 +10,7 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,7 @@ def cell_flows(
         For each axis pressures, shape (nx, ny), NaN where no path from a side leads, and the flow
         [mm³]; None where iterations do not converge.
     """
-    size, pressures, flowing = float(gap.max(initial=0.0)), [], []
+    size, levels, flowing = float(gap.max(initial=0.0)), [], []
     pools, count = ndimage.label(gap > 0.0)
     for axis in axes:
         joined = _joined(pools, count, 1 - axis) if periodic else np.arange(count + 1)
@@ -75,20 +75,22 @@ def cell_flows(
         for one, value in zip(ends, (1.0, 0.0), strict=True):
             by_pool[np.isin(joined, one)] = value
         by_pool[0] = np.nan
-        pressures.append(by_pool[pools])
+        levels.append(by_pool)
         flowing.append(np.isin(joined, through[through > 0])[pools])
     flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    found = {k: one[pools] for k, one in enumerate(levels) if k not in ways}
     for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
         maps = [_links(gap / size * flowing[k], lengths, axes[k], periodic) for k in some]
-        links = [np.array(one) for one in zip(*maps, strict=True)]
-        maps.clear()
-        solved = potentials(links, [axes[k] for k in some], tolerance)
+        ends = [one.pop() for one in maps]
+        links = [np.array([one.pop() for one in maps]) for _ in range(2)][::-1]
+        solved = potentials(links, ends, [axes[k] for k in some], tolerance)
         if solved is None:
             return None
         flows[some] = solved[1] * size**3
         for k, potential in zip(some, solved[0], strict=True):
-            pressures[k][flowing[k]] = np.clip(potential[flowing[k]], 0.0, 1.0)
-    return list(zip(pressures, flows.tolist(), strict=True))
+            found[k] = np.clip(potential, 0.0, 1.0, out=potential)
+            np.copyto(potential, levels[k][pools], where=~flowing[k])
+    return [(found[k], flow) for k, flow in enumerate(flows.tolist())]
 
 
 def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
@@ -108,7 +110,7 @@ def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.int
 
 
 def _links(gap: Array, lengths: tuple[float, float], axis: int, periodic: bool) -> list[Array]:
-    """Return links along x and y, to the source and to the sink, as `potentials` takes them."""
+    """Return links along x and y, and those to source and sink, as `potentials` takes them."""
     shape = gap.shape
     wide = lengths[1] / shape[1] / (lengths[0] / shape[0])
     widths = wide, 1.0 / wide
@@ -120,49 +122,45 @@ def _links(gap: Array, lengths: tuple[float, float], axis: int, periodic: bool) 
         if along == axis or not periodic:
             np.moveaxis(links, along, 0)[-1] = 0.0
         found.append(links)
-    for side in (0, -1):
-        links = np.zeros(shape)
-        np.moveaxis(links, axis, 0)[side] = widths[axis] / half.take(side, axis)
-        found.append(links)
-    return found
+    return [*found, widths[axis] / half.take((0, -1), axis).swapaxes(0, axis)]
 
 
 def potentials(
-    given: list[Array], axes: Sequence[int], tolerance: float
+    links: list[Array], ends: list[Array], axes: Sequence[int], tolerance: float
 ) -> tuple[Array, Array] | None:
     """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
 
     The flow is the power that the potentials dissipate, whose error is of second order in theirs.
 
     Args:
-        given: Links of each cell to the next one along x, from the last to the first, the same
-            along y, links to the terminal of potential 1 and to that of 0; for n directions of flow
-            shape (n, nx, ny) each. 1 is about the largest. Emptied, which frees them.
-        axes: Axis of each direction, 0 for x, whose terminals are at its first and last cells.
+        links: Links of each cell to the next one along x, from the last to the first, and the same
+            along y, for n directions of flow shape (n, nx, ny) each. 1 is about the largest.
+            Emptied, which frees them.
+        ends: For each direction links of its first cells to the terminal of potential 1, and of its
+            last ones to that of 0, shape (2, cells across the flow).
+        axes: Axis of each direction, 0 for x.
         tolerance: Error of the flows that does no harm, relative to them.
 
     Returns:
         Potentials, any where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
-    (along_x, along_y, source, sink), kept = _even(given)
-    given.clear()
-    links = {(1, 0): along_x, (0, 1): along_y}
-    diagonal = sum(link + shifted(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
-    start = [
-        _in_series((along_x, along_y)[axis][k], source[k], sink[k], axis)
-        for k, axis in enumerate(axes)
-    ]
-    cycle = Cycle(links, diagonal)
-    del along_x, along_y, links, diagonal  # which the cycle has as it needs them
-    iteration = _Iteration(cycle, source, start)
-    least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
+    kept = _even(links, ends, axes)
+    fewest = int(_MOST_PER_CELL * min(links[0].shape[1:]))
+    start = [_in_series(links[axis][k], ends[k], axis) for k, axis in enumerate(axes)]
+    least = np.array([1e-15 * one[0].sum() for one in ends])  # what rounding leaves of the flow
+    parts = {(0, 1): links.pop(), (1, 0): links.pop()}
+    parts[0, 0] = sum(link + shifted(link, (-i, -j)) for (i, j), link in parts.items())
+    for sums, axis, one in zip(parts[0, 0], axes, ends, strict=True):
+        np.moveaxis(sums, axis, 0)[[0, -1]] += one
+    cycle = Cycle(parts)
+    iteration = _Iteration(cycle, list(zip(ends, axes, strict=True)), start)
     most, worst = _IMBALANCE * np.sqrt(tolerance), list[float]()
-    for count in range(min(_MOST_ITERATIONS, int(_MOST_PER_CELL * min(source.shape[1:])))):
+    for count in range(min(_MOST_ITERATIONS, fewest)):
         changes = iteration.step()
         left = np.maximum(changes / tolerance, iteration.imbalance / most)
         if count and (left <= np.maximum(iteration.flow, least)).all():
-            found, flow, imbalance = iteration.found(sink)
+            found, flow, imbalance = iteration.found()
             if (imbalance > most * flow).any():  # as rounding has added up in that of iterations
                 return None
             return found[:, kept[0]][:, :, kept[1]], flow
@@ -172,19 +170,18 @@ def potentials(
     return None
 
 
-def _in_series(links: Array, source: Array, sink: Array, axis: int) -> Array:
+def _in_series(links: Array, ends: Array, axis: int) -> Array:
     """Return one potential for each line across the flow, shape (nx, 1) or (1, ny).
 
     They are those of flows from line to line in series, exact where gaps depend on one axis alone.
 
     Args:
         links: Along the axis, those of the last line 0.
-        source: See `potentials`.
-        sink: Likewise.
+        ends: Links to source and sink, shape (2, cells across).
         axis: Axis of the flow.
     """
     between = links.sum(1 - axis, keepdims=True).take(range(links.shape[axis] - 1), axis)
-    first, last = (np.full((1, 1), each.sum()) for each in (source, sink))
+    first, last = (np.full((1, 1), each.sum()) for each in ends)
     drops = np.cumsum(1.0 / np.concatenate((first, between, last), axis), axis)
     return 1.0 - (drops / drops.max()).take(range(links.shape[axis]), axis)
 
@@ -201,15 +198,17 @@ def _are_slow(imbalances: list[float]) -> bool:
     return bool(np.log(imbalances[-1]) > _PATIENCE * falls)
 
 
-def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
-    """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
+def _even(links: list[Array], ends: list[Array], axes: Sequence[int]) -> list[Any]:
+    """Let sides become such that can be halved until the coarsest grid; return which cells stay.
 
     Rows that are added lie, evenly spread, in the links from some to the next, which they divide.
     Many between two others would be chains side by side without links, of which coarser grids lose
     every second one.
 
     Args:
-        links: Those along x and y, to the source and to the sink, as `potentials` takes them.
+        links: See `potentials`.
+        ends: Likewise.
+        axes: Likewise.
     """
     halvings = int(np.ceil(np.log2(max(*links[0].shape[1:], COARSEST) / COARSEST)))
     kept: list[Any] = []
@@ -225,7 +224,10 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
             factor = times if k + 1 == axis else kept[-1]
             wide = values.take(order, axis)
             links[k] = wide * (factor[:, None] if axis == 1 else factor)
-    return links, kept
+        for k, own in enumerate(axes):
+            if own + 1 != axis:
+                ends[k] = ends[k][:, order] * kept[-1]
+    return kept
 
 
 class _Iteration:
@@ -236,7 +238,7 @@ class _Iteration:
 
     Args:
         cycle: Preconditioner, whose finest grid is the problem.
-        source: See `potentials`.
+        ends: For each direction links to terminals and its axis, see `potentials`.
         start: Potentials to begin from, for each direction, of shapes that extend to (nx, ny).
 
     Attributes:
@@ -245,49 +247,60 @@ class _Iteration:
             that adds up over iterations, shape (n,).
     """
 
-    def __init__(self, cycle: Cycle, source: Array, start: Sequence[Array]) -> None:
-        self._cycle, self._grid = cycle, cycle.grids[0]
+    def __init__(self, cycle: Cycle, ends: list[tuple[Array, int]], start: Sequence[Array]) -> None:
+        self._cycle, self._grid, self._ends = cycle, cycle.grids[0], ends
         shape = self._grid.shape
-        self._source = {(i, j): source[:, i::2, j::2] for i, j in PARITIES}
-        self._along, self._work = Cells(shape, float), np.empty(shape)
+        self._along = Cells(shape, float)
+        self._work = np.empty(self._along.own[0, 0].shape)
+        self._beyond = shape[0], shape[1] + 1, shape[2] + 1
         for k, values in enumerate(start):
             for (i, j), own in self._along.own.items():
-                own[k] = np.broadcast_to(values, source.shape[1:])[i::2, j::2]
+                self._grid.inside(own)[k] = values[i % len(values) :: 2, j % values.shape[1] :: 2]
         for one in _SOLVED:
             self._along.wrap(one)
         self._potential = {one: self._along.own[one].copy() for one in _SOLVED}
-        self._balance(self._source)
-        self.flow = source.sum(axis=(1, 2))
-        for one, links in self._source.items():
-            self.flow -= np.einsum("nxy,nxy->n", links, self._along.own[one])
-        self._residual = {one: self._left(one) for one in _SOLVED}
-        self.flow -= _product(self._residual, self._potential)
-        self.imbalance = _sum(self._residual)
-        self._right: Parts = {one: np.empty(shape, np.float32) for one in _SOLVED}
-        self._before, self._changes = np.zeros(len(source)), list[Array]()
+        self._balance(with_source=True)
+        self.flow: Array = np.array([one[0].sum() for one, _ in ends])
+        for one, own in self._along.own.items():
+            for k, links, cells in self._beside_source(one, own):
+                self.flow[k] -= links @ cells
+        self._residual = {one: self._left(one, with_source=True) for one in _SOLVED}
+        self.flow -= self._product(self._residual, self._potential)
+        self.imbalance = self._sum(self._residual)
+        self._right = {one: self._grid.right[one] for one in _SOLVED}
+        self._before, self._changes = np.zeros(len(ends)), list[Array]()
 
-    def _into(self, parity: Offset) -> Array:
-        """Return what flows into cells of a parity from their neighbours, themselves at 0."""
+    def _into(self, parity: Offset, with_source: bool) -> Array:
+        """Return what flows into cells of a parity from others and a source, themselves at 0."""
         beside, links = self._along.beside[parity], iter(self._grid.links[parity].items())
         key, link = next(links)
         total: Array = link * beside[key]
         for key, link in links:
             total += np.multiply(link, beside[key], out=self._work)
+        if with_source:
+            for _, terminals, cells in self._beside_source(parity, total):
+                cells += terminals
         return total
 
-    def _left(self, parity: Offset) -> Array:
-        """Return what potentials leave of the balance of cells of a parity, with sources."""
-        total = self._into(parity)
-        total += self._source[parity]
+    def _beside_source(self, parity: Offset, values: Array) -> Iterator[tuple[int, Array, Array]]:
+        """Yield directions, links of cells of a parity to sources, and values of these cells."""
+        for k, (ends, axis) in enumerate(self._ends):
+            if parity[axis] == 0:
+                cells = np.moveaxis(self._grid.inside(values)[k], axis, 0)[0]
+                yield k, ends[0, parity[1 - axis] :: 2], cells
+
+    def _left(self, parity: Offset, *, with_source: bool = False) -> Array:
+        """Return what potentials leave of the balance of cells of a parity."""
+        total = self._into(parity, with_source)
         total -= np.multiply(self._grid.diagonal[parity], self._along.own[parity], out=self._work)
+        maps = total.reshape(self._beyond)
+        maps[:, -1] = maps[..., -1] = 0.0
         return total
 
-    def _balance(self, source: Parts | None = None) -> None:
+    def _balance(self, *, with_source: bool = False) -> None:
         """Let potentials between those of the others balance what flows, and comes from sources."""
         for one in _BETWEEN:
-            into = self._into(one)
-            if source is not None:
-                into += source[one]
+            into = self._into(one, with_source)
             np.multiply(into, self._grid.inverse[one], out=self._along.own[one])
             self._along.wrap(one)
 
@@ -298,70 +311,66 @@ class _Iteration:
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along = self._residual, self._along
-        scale = self.imbalance[:, None, None] + np.finfo(float).tiny
+        scale = self.imbalance[:, None] + np.finfo(float).tiny
         for one, right in self._right.items():
             np.multiply(residual[one], 1.0 / scale, out=right, casting="same_kind")
         guess = self._cycle(self._right)
-        steps = {one: guess[one] * scale for one in _SOLVED}
-        now = _product(residual, steps)
+        now = self._product(residual, guess) * scale[:, 0]
         again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
         self._before = now
-        for one, step in steps.items():
+        for one in _SOLVED:
             own = along.own[one]
-            own *= again[:, None, None]
-            own += step
+            own *= again[:, None]
+            own += np.multiply(guess[one], scale, out=self._work)
             along.wrap(one)
         self._balance()
-        out = {one: self._grid.diagonal[one] * along.own[one] - self._into(one) for one in _SOLVED}
-        power = _product(out, along.own)
+        out = {one: self._left(one) for one in _SOLVED}
+        power = -self._product(out, along.own)
         length = np.divide(now, power, out=np.zeros_like(now), where=power > 0.0)
         for one in _SOLVED:
-            by = length[:, None, None]
+            by = length[:, None]
             self._potential[one] += np.multiply(along.own[one], by, out=self._work)
-            residual[one] -= np.multiply(out[one], by, out=self._work)
-        self._changes.append(length * now)
+            residual[one] += np.multiply(out[one], by, out=self._work)
+        self._changes.append(np.asarray(length * now))
         self.flow = self.flow - self._changes[-1]
-        self.imbalance = _sum(residual)
+        self.imbalance = self._sum(residual)
         last = max(2, len(self._changes) // 4)
         return np.asarray(np.sum(self._changes[-last:], axis=0))
 
-    def found(self, sink: Array) -> tuple[Array, Array, Array]:
+    def found(self) -> tuple[Array, Array, Array]:
         """Return the potential of all cells, the power it dissipates, and the imbalance it leaves.
 
-        Args:
-            sink: See `potentials`.
+        Iterations end by that.
 
         Returns:
             Shapes (n, nx, ny), (n,) and (n,).
         """
-        grid, along = self._grid, self._along
-        self._along = Cells(grid.shape, float)
+        grid = self._grid
         for one, values in self._potential.items():
             self._along.own[one][:] = values
             self._along.wrap(one)
-        self._balance(self._source)
+        self._balance(with_source=True)
         found = np.empty((grid.shape[0], 2 * grid.shape[1], 2 * grid.shape[2]))
         for (i, j), values in self._along.own.items():
-            found[:, i::2, j::2] = values
-        flow = np.einsum("nxy,nxy,nxy->n", sink, found, found)
+            found[:, i::2, j::2] = grid.inside(values)
+        flow = np.zeros(len(found))
+        for k, (ends, axis) in enumerate(self._ends):
+            first, last = np.moveaxis(found[k], axis, 0)[[0, -1]]
+            flow[k] = ends[0] @ (1.0 - first) ** 2 + ends[1] @ last**2
         for one in _BETWEEN:  # which all links lead from
             own = self._along.own[one]
             for key, link in grid.links[one].items():
-                drop = np.subtract(own, self._along.beside[one][key], out=self._work)
-                flow += np.einsum("nxy,nxy,nxy->n", link, drop, drop)
-        for one, source in self._source.items():
-            drop = np.subtract(1.0, self._along.own[one], out=self._work)
-            flow += np.einsum("nxy,nxy,nxy->n", source, drop, drop)
-        left = {one: self._left(one) for one in PARITIES}
-        self._along = along
-        return found, flow, _sum(left)
+                drop = grid.inside(own - self._along.beside[one][key])
+                flow += np.einsum("nxy,nxy,nxy->n", grid.inside(link), drop, drop)
+        parts = ({one: self._left(one, with_source=True)} for one in PARITIES)
+        return found, flow, np.asarray(sum(map(self._sum, parts)))
 
+    @staticmethod
+    def _sum(parts: Parts) -> Array:
+        """Return sums of absolute values, shape (n,)."""
+        return np.asarray(sum(np.abs(one).sum(axis=1) for one in parts.values()))
 
-def _sum(parts: Parts) -> Array:
-    """Return sums of absolute values, shape (n,)."""
-    return np.asarray(sum(np.abs(one).sum(axis=(1, 2)) for one in parts.values()))
-
-
-def _product(first: Parts, second: Parts) -> Array:
-    """Return inner products of values of the cells that are solved for, shape (n,)."""
-    return np.asarray(sum(np.einsum("nxy,nxy->n", first[one], second[one]) for one in _SOLVED))
+    @staticmethod
+    def _product(first: Parts, second: Parts) -> Array:
+        """Return inner products of values of the cells that are solved for, shape (n,)."""
+        return np.asarray(sum(np.einsum("nx,nx->n", first[one], second[one]) for one in _SOLVED))

@@ -132,18 +132,24 @@ class GapFlow:
         """Whether an open path leads from side to side."""
         return self.total > 0.0
 
-    @cached_property
+    @property
     def network(self) -> Network:
-        """The network of the cells, those of a map with its axes swapped for a flow along y."""
+        """The network of the cells, those of a map with its axes swapped for a flow along y.
+
+        It takes several times the memory of the map, and is made anew each time.
+        """
         turned, sides = _turned(self.gap, self.lengths, self.axis)
         return cell_network(turned**3, sides, periodic=self.periodic)
 
-    @cached_property
+    @property
     def solution(self) -> NetworkFlow:
         """The flow through the network, none in pools that no path from a side leads to."""
+        return self._through(self.network)
+
+    def _through(self, network: Network) -> NetworkFlow:
         turned, _ = _turned(self.pressure, self.lengths, self.axis)
         potential = np.append(turned, (1.0, 0.0))
-        flow = np.nan_to_num(self.network.flow(potential))
+        flow = np.nan_to_num(network.flow(potential), copy=False)
         return NetworkFlow(total=self.total, potential=potential, flow=flow)
 
     @property
@@ -181,7 +187,8 @@ class GapFlow:
 
         1 is that between parallel plates at the mean gap.
         """
-        network, flow, size = self.network, self.solution.flow, self.network.count + 2
+        network, size = self.network, self.gap.size + 2
+        flow = self._through(network).flow
         row = self.gap.shape[1 - self.axis]
         across = network.tail // row == network.head // row
         plates = float(self.gap.mean()) ** 3 / self.lengths[self.axis]
@@ -200,7 +207,8 @@ class GapFlow:
         if not self.percolates:
             return None
         gap, lengths = _turned(self.gap, self.lengths, self.axis)
-        found = critical_constriction(self.network, self.solution, gap, lengths)
+        network = self.network
+        found = critical_constriction(network, self._through(network), gap, lengths)
         return found.turned if self.axis else found
 
     def _oriented(self, values: Array) -> Array:

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from patchlaw import Spectrum, synthesise
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.transport import gap_flows
 from patchlaw.multiscale.laws import transmissivity
 from patchlaw.multiscale.laws.transmissivity import (
     flow_memory,
@@ -73,4 +75,21 @@ def test_a_table_keeps_no_more_memory_than_plan_says(monkeypatch):
     finally:
         tracemalloc.stop()
     stated = flow_memory(0, surface.heights.size)
+    assert 0.7 * stated < taken <= stated
+
+
+@pytest.mark.parametrize("cells", [180, 288])
+def test_flows_take_the_memory_that_is_stated(cells):
+    heights = ndimage.gaussian_filter(
+        np.random.default_rng(cells).normal(size=(cells, cells)), 3.0, mode="wrap"
+    )
+    gap = np.maximum(heights + 0.8 * heights.std(), 0.0)
+    tracemalloc.start()
+    try:
+        for flow in gap_flows(gap, (1.0, 1.0), periodic=True):
+            assert flow.constriction.share > 0.0
+        taken = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    stated = flow_memory(cells**2)
     assert 0.7 * stated < taken <= stated
