@@ -379,6 +379,7 @@ def sampled_scene(number):
     force = 0.5 * share * slope * modulus * sides[0] * sides[1]
     if "hardness" in data["micro"]:
         data["micro"]["hardness"] = float(random.uniform(0.3, 1.0)) * slope * modulus
+        del data["conductance"]
     height = float(random.uniform(2.0, 6.0))
     data["block"] |= {"lengths": sides, "height": height, "cells": [2, 2, 2]}
     data["coupling"] = {"table_tolerance": 0.01}
