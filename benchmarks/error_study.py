@@ -607,25 +607,25 @@ def of_class(kind, numbers):
         return
     for number in numbers:
         began, steps = time.perf_counter(), 1
-        if kind in ("wearing", "sampled"):
-            data, other = (worn_scene if kind == "wearing" else sampled_scene)(number)
-            finer = data | other
-        else:
-            data, steps = (read_scene(kind, number), 1) if reads else class_scene(kind, number)
-            times = 4 if reads or kind == "full" else 2
-            finer = data | finer_surface(data, times)
-        finer["output"] = data["output"] | {"check": "none"}
-        coupling = data["coupling"].get("kind", "representative")
-        if reads and coupling == "consistent":
-            finer["coupling"] = {"kind": "concurrent"}
-        if not reads and kind != "full":
-            every = "shear_steps" if kind == "turning" else "steps"
-            finer["load"] = data["load"] | {every: STEPS_OF_TRUTH * steps}
-            finer["friction"] = data["friction"] | {"coupled": True}
         try:
+            if kind in ("wearing", "sampled"):
+                data, other = (worn_scene if kind == "wearing" else sampled_scene)(number)
+                finer = data | other
+            else:
+                data, steps = (read_scene(kind, number), 1) if reads else class_scene(kind, number)
+                times = 4 if reads or kind == "full" else 2
+                finer = data | finer_surface(data, times)
+            finer["output"] = data["output"] | {"check": "none"}
+            coupling = data["coupling"].get("kind", "representative")
+            if reads and coupling == "consistent":
+                finer["coupling"] = {"kind": "concurrent"}
+            if not reads and kind != "full":
+                every = "shear_steps" if kind == "turning" else "steps"
+                finer["load"] = data["load"] | {every: STEPS_OF_TRUTH * steps}
+                finer["friction"] = data["friction"] | {"coupled": True}
             step, true = last_step(data), last_step(finer)
-        except NotConverged as error:
-            print(f"{number:3d} not converged: {error}", flush=True)
+        except (NotConverged, InputError) as error:  # such as a load that a hardness cannot bear
+            print(f"{number:3d} has no solution: {error}", flush=True)
             continue
         told = []
         for name, off, stated, size in quantities(kind, step, true):

@@ -40,6 +40,19 @@ def ran(kind):
     return run(scene(kind))
 
 
+@pytest.mark.parametrize("load", [{"approach": 0.008}, {"force": 20.0}])
+def test_gas_next_to_contacts_errs_by_the_size_of_the_cells(load):
+    """Insulators: most of the heat goes through the gas, and most of that next to contacts."""
+    heat = {"conductivity": "0.2 W/m/K", "gas": "0.026 W/m/K", "temperature_jump": "70 nm"}
+    asked = scene(conductance=heat, load=load | {"steps": 1}).with_({"output.check": "last"})
+    finer = asked.with_({"surface.grid": [96, 96], "output.check": "none"})
+    step, exact = (run(one)[-1] for one in (asked, finer))
+    for name in ("gap_conductance", "thermal_conductance"):
+        own, true = (getattr(one, f"{name}_W_per_K") for one in (step, exact))
+        assert own < 0.95 * true
+        assert true - own < 1.5 * getattr(step, f"{name}_error_W_per_K") < 1.5 * true
+
+
 def test_contacts_conduct_by_the_stiffness_of_the_interface():
     asked = scene(micro={"finite_slopes": False})
     model, setup = None, make_setup(asked)
