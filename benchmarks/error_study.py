@@ -63,7 +63,8 @@ OF_READING = "reading", "yielding", "harder", "sampled"
 TWISTS = "few", "full", "lay", "honed", "steep", "smooth", "long", "units"
 """What is unusual about scenes of the class ``harder``: one to five contacts of a cell, nearly full
 contact, ridges along one side, plateaus with grooves, slopes of 0.4 to 0.6, slopes below 1e-3,
-sides 1 : 3 to 1 : 5 of odd numbers of cells, sides of 0.1 µm to 0.1 mm or 10 m to 10 km."""
+sides 1 : 3 to 1 : 5 of odd numbers of cells, sides of 0.1 µm to 0.1 mm or 10 m to 10 km. Their
+bodies insulate, so that gas conducts most of the heat."""
 STEPS_OF_TRUTH = 4
 OF_OTHERS = []
 """True over stated errors of contact area and mean gap, of the scenes that are not meshed."""
@@ -315,7 +316,7 @@ def read_scene(kind, number):
         "micro": {"model": "half-space"},
         "coupling": {"kind": kind},
         "conductance": {
-            "conductivity": ["50 W/m/K"], "resistivity": ["1.7e-7 ohm m"],
+            "conductivity": ["0.2 W/m/K" if twist else "50 W/m/K"], "resistivity": ["1.7e-7 ohm m"],
             "gas": "0.026 W/m/K", "temperature_jump": "0.4 um",
         },
         "output": {"check": "last", "figures": False, "report": False},
@@ -425,6 +426,7 @@ def twisted(data, twist, random, share):
         surface["lengths"] = [size * one for one in surface["lengths"]]
         if "height" in block:
             block["height"] *= size
+        data["conductance"]["temperature_jump"] = f"{0.4 * size!r} um"
     return share
 
 
