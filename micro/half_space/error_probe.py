@@ -69,6 +69,11 @@ against four times as many a side, 190 of 192 true errors were within 1.5 × the
 were 3 to 8 × the true ones in the median."""
 
 _UNKNOWN = math.nan, math.nan
+_OF_RADII = 0.6
+"""Error of the stiffness by the cells over that of the contact area, relative, at least: a spot is
+as stiff as its radius. On 384 half-spaces of 24² to 40² cells, 0.2 to 32 % in contact, with 4 to
+2000 cells, against four times as many a side, coarser grids agreed by accident on 10, where the
+true error was up to 12 × the one stated without this; with it, it was more than 1.5 × on one."""
 _OF_YIELDING = 0.5
 """Error of the stiffness of cells that yield over what fewer cells change by as `_OF_OTHERS`."""
 
@@ -461,8 +466,12 @@ class _Problems:
         half, quarter = map(self._lengths_on, (self._half, self._quarter))
         known = interface, interface, approach
         by_cells = np.array([_share_by_cells(*on) for on in zip(known, half, quarter, strict=True)])
-        # coarser grids may agree by accident in one of them: compliances add to that of the plane
-        by_cells[2] = max(by_cells[2], by_cells[0] * min(1.0, interface / (approach or math.nan)))
+        # coarser grids may agree by accident: spots are as stiff as their radii, compliances add to
+        # that of the plane, and at an approach stiffnesses err as forces where these are lines
+        area = self._answer(self._grid)[1]
+        by_cells[:2] = np.maximum(by_cells[:2], _OF_RADII * parts["grid"][1] / area)
+        part = by_cells[0] * min(1.0, interface / (approach or math.nan))
+        by_cells[2] = max(by_cells[2], whole["grid"] - force["grid"], part)
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
             elastic = self._lengths_on(self._grid)[1]

@@ -187,8 +187,9 @@ class LoadStep(Displayed):
         in_report="thermal conductance", error="thermal_conductance_error_W_per_K",
     )  # fmt: skip
     gap_conductance_W_per_K: float | None = column(
-        "Part of it through gas and radiation", "W/K", heading="of it through gaps"
-    )
+        "Part of it through gas and radiation", "W/K", heading="of it through gaps",
+        error="gap_conductance_error_W_per_K",
+    )  # fmt: skip
     electrical_conductance_S: float | None = column(
         "Electrical conductance of the contacts", "S", heading="electrical conductance",
         in_report="electrical conductance", error="electrical_conductance_error_S",
@@ -286,6 +287,9 @@ class LoadStep(Displayed):
     worn_volume_error_mm3: float | None = column("Error of the worn volume", "mm³")
     mean_worn_depth_error_mm: float | None = column("Error of the mean worn depth", "mm")
     worn_depth_error_mm: float | None = column("Error of the largest worn depth", "mm")
+    gap_conductance_error_W_per_K: float | None = column(
+        "Error of the conductance through gaps", "W/K"
+    )
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

@@ -110,8 +110,7 @@ class LeakObserver(StepObserver):
         with self._coupling.clock.phase("leak"):
             self._tell(0)
             leaks = self._leaks(step)
-            check = self._coupling.scene.output.check
-            if (check == "all" or (check == "last" and last)) and self._measures(step, past):
+            if self._checks(last) and self._measures(step, past):
                 leaks = self._with_errors(step, leaks)
         return {"leaks": leaks}
 

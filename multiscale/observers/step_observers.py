@@ -114,6 +114,11 @@ class StepObserver:
             self._failures[f"{what}: {error}"] = None
             return None
 
+    def _checks(self, last: bool) -> bool:
+        """Tell whether errors are to be measured at a load step, the last one or another."""
+        check = self._coupling.scene.output.check
+        return check == "all" or (check == "last" and last)
+
     def _plastic_past(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
         """Tell whether the plastic depth is not that of rising loads, which checks solve for."""
         if not self._coupling.scene.hardness_key:
@@ -237,9 +242,8 @@ class ErrorCheck(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the errors, where they are to be measured."""
-        coupling, check = self._coupling, self._coupling.scene.output.check
-        asked = check == "all" or (check == "last" and last)
-        if not (asked and coupling.causes) or coupling.about.unmeasured():
+        coupling = self._coupling
+        if not (self._checks(last) and coupling.causes) or coupling.about.unmeasured():
             return {}
         normal = not self._plastic_past(step, past)
         if not normal:

@@ -221,7 +221,7 @@ def stiffness_errors(
     """Return errors of stiffnesses and of conductances, by their columns.
 
     Contacts conduct in proportion to the stiffness. What gaps conduct changes with mean gap and
-    open area.
+    open area, and with the cells next to contacts, where a load step knows by how much.
 
     Args:
         step: The load step.
@@ -244,7 +244,10 @@ def stiffness_errors(
         error = conducts * (thermal - gaps)
         if gaps:
             is_open = 1.0 - step.contact_area_fraction
-            error += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
+            others = gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
+            through = (step.gap_conductance_error_W_per_K or 0.0) + others
+            errors["gap_conductance_error_W_per_K"] = through
+            error += through
         errors["thermal_conductance_error_W_per_K"] = error
     return errors
 

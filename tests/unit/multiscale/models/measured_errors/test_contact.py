@@ -55,6 +55,25 @@ def test_samples_of_mirror_images_err_alike_whichever_comes_first():
     np.testing.assert_allclose(*found, rtol=1e-3)
 
 
+@pytest.mark.parametrize(("waves", "hurst", "seed", "grid", "side", "load"), [
+    # spots of 13 cells, whose area tells; and against the plane, which the force tells
+    ((2.0, 4.0), 0.7, 9056, (24, 24), 1.1, 0.01),
+    ((1.379959221005975, 5.063934911119695), 0.4225255415065133, 1007560844, (31, 34),
+     1.1190243883710782, 0.17451901996555097),
+])  # fmt: skip
+def test_stiffnesses_on_coarser_grids_that_agree_by_accident(waves, hurst, seed, grid, side, load):
+    spectrum = Spectrum(hurst=hurst, waves=waves, rms_slope=0.1, seed=seed)
+    surface = synthesise(spectrum, grid=grid, lengths=(1.0, side))
+    model = HalfSpaceModel(surface, contact_modulus=1e3)
+    finer = model.resampled((4 * grid[0], 4 * grid[1]))
+    at, exact = (one.press(Control(force=100.0 * load)) for one in (model, finer))
+    own, true = model.stiffness(at, turns=False)[:2], finer.stiffness(exact, turns=False)[:2]
+    probe = ErrorProbe(model=model, on_body=lambda model, _: model, order=0)
+    known = read(at), at.approach, (0.0, 0.0)
+    errors = probe.measure(*known, start=at.guess, by_force=True, stiffnesses=own).by_cause["grid"]
+    assert (np.abs(1.0 - np.divide(true, own)) < 1.5 * errors[[3, 5]]).all()
+
+
 CAUSES = {
     "analytic": {"slopes", "zero", "grid"},
     "concurrent": {"body", "slopes", "zero", "grid"},
