@@ -11,7 +11,8 @@ from typing import Annotated, Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import eigh, solve
+from scipy.linalg import cholesky, eig, eigh, inv, schur, solve
+from scipy.sparse.csgraph import connected_components
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
@@ -37,6 +38,10 @@ _ACCURATE, _NEXT = 1e-10, 1e-6
 """Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M, and
 of the mode beyond the wanted ones. With 1e-8 residuals of tetrahedra were 1e-6, for a fifth fewer
 cycles of multigrid."""
+_REPEATED, _UNSURE = 1e-8, 1e-10
+"""Distance of squared frequencies, relative to these, within which they are one that is repeated:
+rounding and loads that are found to a tolerance part them by less. Relative error of stiffness that
+leaves open whether two modes of a face that slides have just merged or are just apart."""
 _NOISE = 1e-14
 """Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
 _BESIDE = 8
@@ -58,11 +63,15 @@ Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "cre
 class NaturalModes:
     """Free vibrations φ exp(λ t) of K u + M ü = 0, by rising frequency.
 
+    Modes whose λ² are equal within 1e-8, or where two modes merge to rounding, are a group: its
+    members have their mean as λ, and shapes that are an orthonormal basis of what they span.
+
     Attributes:
         eigenvalues: λ with an imaginary part not below zero, shape (n,) [1/s].
         shapes: This rank's rows of φ, with φᴴ M φ = 1, shape (m, n).
         momenta: M φ likewise.
-        residuals: |K φ + λ² M φ| / (|K φ| + |λ² M φ|) of the full problem, shape (n,).
+        residuals: |K φ + λ² M φ| / (|K φ| + |λ² M φ|) of the full problem, shape (n,); in a group
+            less the part of K φ in its space.
     """
 
     eigenvalues: Array
@@ -207,13 +216,16 @@ class _Problem:
         """
         add = self.comm.allreduce
         forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
-        small = [add(basis.T @ one) for one in (forces, momenta)]
-        _, turned = eigh(*small) if self.symmetric else np.linalg.eig(solve(*small[::-1]))
-        turned = turned / np.sqrt(np.einsum("ik,ij,jk->k", turned.conj(), small[1], turned).real)
-        shapes, forces, momenta = (one @ turned for one in (basis, forces, momenta))
-        stiff = self.diagonal[:, None] * shapes
-        squares, alone = (add((shapes.conj() * one).sum(axis=0)) for one in (forces, stiff))
-        zero = abs(squares) <= _ROUNDING * alone.real + _ACCURATE**2 * self.largest
+        scale = inv(cholesky(add(basis.T @ momenta)))  # with which vectors are orthonormal
+        basis, forces, momenta = (one @ scale for one in (basis, forces, momenta))
+        stiff = self.diagonal[:, None] * basis
+        matrix, alone = (add(basis.T @ one) for one in (forces, stiff))
+        none = _ROUNDING * alone + _ACCURATE**2 * self.largest * np.eye(len(alone))
+        turn, same = _groups(matrix, none, symmetric=self.symmetric)
+        shapes, forces, momenta, stiff = (one @ turn for one in (basis, forces, momenta, stiff))
+        among = np.where(same, add(shapes.conj().T @ forces), 0.0)
+        squares = same @ among.diagonal() / same.sum(axis=1)
+        zero = abs(squares) <= _along(none, turn)
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
         values = np.sqrt(-np.where(zero, 0.0, squares) + 0j)
         values = np.where(values.imag < 0.0, -values, values) + 0.0
@@ -222,7 +234,7 @@ class _Problem:
         floor = _SHIFT * np.where(zero, self.largest * momenta, stiff)
         left, *usual = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
-            for one in (forces + values**2 * momenta, forces, values**2 * momenta, floor)
+            for one in (forces - momenta @ among, forces, values**2 * momenta, floor)
         )
         return NaturalModes(
             eigenvalues=values[order],
@@ -268,7 +280,7 @@ class _Span:
         return np.asarray((shares.T @ self._parts[0]).T)
 
     def beside(self, columns: Array) -> tuple[Array, Array]:
-        """Return columns less their part in the span as rows (k, m), and their sizes by M (k,).
+        """Return columns less their part in the span, and by M, (2, k, m), and their sizes (k,).
 
         The size is zero where all that is left is rounding.
         """
@@ -280,14 +292,14 @@ class _Span:
         moved = products(self._problem.mass, rows.T).T
         squares = self._add(np.einsum("kn,kn->k", rows, moved))
         lost = (again**2).sum(axis=1)
-        return rows, np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
+        sizes = np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
+        return np.stack([rows, moved]), sizes
 
     def extend(self, rows: Array, sizes: Array) -> None:
         """Take what `beside` returned, as far as it is neither rounding nor copies."""
         if not sizes.any():
             return
-        rows = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
-        momenta = products(self._problem.mass, rows.T).T
+        rows, momenta = rows[:, sizes > 0.0] / sizes[sizes > 0.0, None]
         for _ in range(2):  # vectors that are nearly copies leave 1e-6 of one another at first
             weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
             apart = weights > _COPY * weights[-1]
@@ -328,8 +340,12 @@ class _Span:
         shares = np.where(values.imag < 0.0, shares.imag, shares.real)
         if not self._problem.symmetric:  # modes about to merge are nearly parallel
             shares, _ = np.linalg.qr(shares)
-        ends = [min(size, len(values)) for size in (count, most)]
-        wanted, kept = (end + int(values[end - 1].imag > 0.0) for end in ends)
+        wanted, kept = (min(size, len(values)) for size in (count, most))
+        kept += int(values[kept - 1].imag > 0.0)
+        floor = _ROUNDING * self._problem.largest
+        apart = abs(np.diff(values)) > _REPEATED * abs(values[1:]) + floor
+        while wanted < kept and (values[wanted - 1].imag > 0.0 or not apart[wanted - 1]):
+            wanted += 1
         return shares[:, :kept], wanted
 
     def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags]:
@@ -391,8 +407,8 @@ def _lowest(
         if known or len(span) == problem.unknowns:
             return span.combined(shares[:, :wanted])
         further = (errors >= limits)[asked]
-        rows, sizes = rows[further], sizes[further]
-        if len(span) + len(rows) > _ROOM * block:
+        rows, sizes = rows[:, further], sizes[further]
+        if len(span) + len(sizes) > _ROOM * block:
             shares = span.restart(shares, past)
         span.extend(rows, sizes)
         past = shares
@@ -412,7 +428,7 @@ def _started(problem: _Problem, block: int, correct: Corrections, start: Array |
     span = _Span(problem, _ROOM * block + first.shape[1] + width)
     for turn in range(_MOST_STARTS):
         random = own * draw.standard_normal((len(own), width))
-        random = correct(products(problem.mass, span.beside(random)[0].T))
+        random = correct(products(problem.mass, span.beside(random)[0][0].T))
         rows, sizes = span.beside(random if turn else np.hstack([first, random]))
         if not (turn or (sizes > 0.0).all()):
             reason = "the preconditioner returns zeros, or what is no number"
@@ -421,6 +437,48 @@ def _started(problem: _Problem, block: int, correct: Corrections, start: Array |
         if len(span) >= min(block, problem.unknowns):
             break
     return span
+
+
+def _groups(matrix: Array, none: Array, *, symmetric: bool) -> tuple[Array, Flags]:
+    """Return the shapes of modes of a matrix in columns, and which are of one group, both (n, n).
+
+    Shapes of a group are orthonormal. Of two modes that have just merged the shapes are parallel,
+    and their distance is the root of an error of the matrix: what they span is accurate.
+
+    Args:
+        matrix: The stiffness of orthonormal vectors, shape (n, n).
+        none: A form of the vectors below which squared frequencies are zero, shape (n, n).
+        symmetric: Whether the matrix is symmetric.
+    """
+    if symmetric:
+        values, turn = eigh(matrix)
+        error = np.full(len(values), _REPEATED)
+    else:
+        values, other, turn = eig(matrix, left=True)
+        parallel = abs((other.conj() * turn).sum(axis=0)) + np.finfo(float).tiny
+        error = np.clip(_UNSURE / parallel, _REPEATED, np.sqrt(_UNSURE))
+    told = np.where(abs(values) <= _along(none, turn), 0.0, values)
+    error = error * abs(told)
+    apart = abs(told[:, None] - told) > np.minimum(error[:, None], error)
+    label = connected_components(~apart)[1]
+    same = label[:, None] == label
+    for group in [] if symmetric else np.unique(same, axis=0):
+        if (size := int(group.sum())) > 1:
+            turn = turn + 0j
+            away = abs(values - values[group].mean())
+            radius = 0.5 * (away[group].max() + away[~group].min(initial=2.0 * away.max() + 1.0))
+            middle = values[group].mean()
+            order = schur(matrix, "complex", sort=lambda one: abs(one - middle) <= radius)[1]
+            turn[:, group] = order[:, :size]
+            if abs(told[group].imag.sum()) <= _REPEATED * abs(told[group].imag).sum():  # a real one
+                both = np.hstack([order[:, :size].real, order[:, :size].imag])
+                turn[:, group] = np.linalg.svd(both)[0][:, :size]
+    return turn, same
+
+
+def _along(form: Array, turn: Array) -> Array:
+    """Return the values of a form (n, n) for vectors in columns, shape (k,)."""
+    return np.asarray(np.einsum("ik,ij,jk->k", turn.conj(), form, turn).real)
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:
