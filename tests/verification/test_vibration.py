@@ -23,7 +23,7 @@ from helpers.user_problems import (
 )  # fmt: skip
 from petsc4py import PETSc
 from scipy.io import mmread
-from scipy.linalg import block_diag, eig, eigh
+from scipy.linalg import block_diag, cholesky, eig, eigh, eigvals, eigvalsh, solve_triangular
 from scipy.optimize import brentq
 from scipy.spatial import KDTree
 
@@ -41,6 +41,7 @@ from patchlaw.macro import (
     write_contact_stiffness,
 )
 from patchlaw.macro.contact import face_vibration
+from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.face_vibration import FaceVibration, mass_matrix
 from patchlaw.support import InputError, NotConverged
 
@@ -373,6 +374,44 @@ def test_modes_start_from_those_at_the_load_before(monkeypatch, friction):
     size = abs(afresh).max()  # accurate as above
     assert near == pytest.approx(afresh, rel=1e-9, abs=1e-9 * size)
     assert fewer < 0.8 * usual
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cells", "friction", "plane"), [((14, 10, 8), None, 1e-9), ((12, 10, 7), (0.9, 0.4), None)]
+)
+def test_modes_of_thousands_of_unknowns_are_those_of_dense_matrices(cells, friction, plane):
+    """Of 3961 unknowns with a plane that moves, and of 3003 of which six modes grow."""
+    draw = np.random.default_rng(51)
+    height = draw.uniform(0.4, 0.8)
+    block = block_of("free", YOUNG, 0.3, density=DENSITY, cells=cells, height=height)
+    laws = [PowerLaw(k, power=1.5) for k in draw.uniform(1e4, 8e5, 4)]
+    face = interface_of(block, (2, 2))
+    problem = LawContactProblem(face, laws, "pointwise")
+    state = problem.solve(Control(approach=5e-3))
+    along = None if friction is None else np.array(friction)
+    tangents = problem.forces.vibration_tangents(state, along)
+    vibration = FaceVibration(face, "pointwise", plane, 0)  # by multigrid
+    found, *_ = vibration.modes(tangents, 25)
+    springs = face_springs(face, "pointwise", tangents, plane is not None)
+    bodies = vibration._stiffness.copy()
+    bodies.axpy(1.0, springs, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    free = np.flatnonzero(vibration._free.array_r)
+    stiffness, mass = (
+        one.convert("dense", PETSc.Mat()).getDenseArray()[np.ix_(free, free)]
+        for one in (bodies, vibration.mass)
+    )
+    lower = cholesky(mass, lower=True)
+    half = solve_triangular(lower, stiffness, lower=True)
+    whole = solve_triangular(lower, half.T, lower=True).T
+    squares = eigvalsh(whole) if friction is None else eigvals(whole, overwrite_a=True)
+    squares = squares[np.argsort(abs(squares))][: len(found.eigenvalues)]
+    apart = abs(-(found.eigenvalues[:, None] ** 2) - squares)
+    apart = np.minimum(apart, abs(-(found.eigenvalues[:, None].conj() ** 2) - squares))
+    # rounding of the dense matrices, whose largest squares are 1e3 times these
+    assert (apart.min(axis=0) < 1e-10 * abs(squares)).all()
+    assert (apart.min(axis=1) < 1e-10 * abs(squares).max()).all()
+    assert (found.damping.min() < 0.0) == (friction is not None)
 
 
 @pytest.mark.parametrize("factorised", [10_000, 0])
