@@ -21,7 +21,7 @@ from patchlaw.macro.linear_solvers.solvers import Factors
 from patchlaw.support import Array, Count, Flags, Has, Indices, InputError, NotConverged, checked
 
 _SHIFT = 1e-8
-"""Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
+"""Shift below zero over the geometric mean of eigenvalues of single unknowns, by which the matrix of a free
 body has an inverse; bodies of 100 cells have their first mode at 1e-4. What is left of a mode is
 compared with this part of the forces of its single nodes where its own forces are less."""
 _OF_LEAST = 1e-2
@@ -193,7 +193,11 @@ class _Problem:
         self.largest = self._largest(ratios)
         if not self.largest > 0.0:
             raise InputError("the stiffness has no positive diagonal, or the mass has none")
-        self.least = 1.0 / self._largest(1.0 / ratios[ratios > 0.0])
+        ratios = ratios[ratios > 0.0]
+        self.least = 1.0 / self._largest(1.0 / ratios)
+        # nodes that are nearly massless would shift the modes of all others
+        size, logs = self.comm.allreduce(np.array([len(ratios), np.log(ratios).sum()]))
+        self.usual = float(np.exp(logs / size))
         diagonal.array[~own] = self._largest(diagonal.array_r)  # what is held has no mass
         self.stiffness.setDiagonal(diagonal)
         self.diagonal = diagonal.array_r
@@ -205,7 +209,7 @@ class _Problem:
         """Return those of K + c M with a small c, as the stiffness of free bodies has none."""
         shifted = self.stiffness.copy()
         structure = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
-        low, high = _ROUNDING * self.largest, _SHIFT * self.largest
+        low, high = _ROUNDING * self.usual, _SHIFT * self.usual
         shifted.axpy(float(np.clip(_OF_LEAST * self.least, low, high)), self.mass, structure)
         return Factors(shifted, symmetric=self.symmetric)
 
@@ -342,9 +346,12 @@ class _Span:
             shares, _ = np.linalg.qr(shares)
         wanted, kept = (min(size, len(values)) for size in (count, most))
         kept += int(values[kept - 1].imag > 0.0)
-        floor = _ROUNDING * self._problem.largest
+        floor = _ROUNDING * self._problem.usual
         apart = abs(np.diff(values)) > _REPEATED * abs(values[1:]) + floor
-        while wanted < kept and (values[wanted - 1].imag > 0.0 or not apart[wanted - 1]):
+        last = kept - int(kept < self._problem.unknowns)  # the next one tells that they converge
+        while wanted < kept and (
+            values[wanted - 1].imag > 0.0 or (wanted < last and not apart[wanted - 1])
+        ):
             wanted += 1
         return shares[:, :kept], wanted
 
