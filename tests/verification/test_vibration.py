@@ -221,7 +221,18 @@ def test_modes_that_just_merge_are_found_with_nearly_all_others(seed):
     assert np.sort(-(found.eigenvalues**2).real) == pytest.approx(squares[:count], rel=1e-6)
 
 
-@pytest.mark.parametrize("light", [0.0, 1e-10, 1e-14])
+def test_modes_about_to_merge_have_no_damping_of_rounding():
+    """A defective pair splits by the root of rounding, along λ or across, by chance."""
+    draw = np.random.default_rng(77)
+    squares = np.sort(draw.uniform(1e10, 1e12, 9))
+    blocks = [[[a, draw.uniform(0.1, 1.0) * a], [0.0, a]] for a in squares]
+    found = natural_modes(*turned(block_diag(*blocks), draw), 6)
+    assert not found.damping.any() and found.residuals.max() < 1e-8
+    expected = np.repeat(np.sqrt(squares[:3]), 2)
+    assert found.eigenvalues.imag == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("light", [0.0, 1e-10, 1e-12])
 def test_unknowns_without_a_mass_follow_the_others(light):
     draw = np.random.default_rng(30)
     stiff = np.diag(draw.uniform(0.1, 10.0, 25)) + np.ones((25, 25))
