@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import cholesky, eig, eigh, inv, schur, solve
+from scipy.linalg import cholesky, eig, eigh, inv, schur
 from scipy.sparse.csgraph import connected_components
 
 from patchlaw.macro import compat
@@ -21,9 +21,10 @@ from patchlaw.macro.linear_solvers.solvers import Factors
 from patchlaw.support import Array, Count, Flags, Has, Indices, InputError, NotConverged, checked
 
 _SHIFT = 1e-8
-"""Shift below zero over the geometric mean of eigenvalues of single unknowns, by which the matrix of a free
-body has an inverse; bodies of 100 cells have their first mode at 1e-4. What is left of a mode is
-compared with this part of the forces of its single nodes where its own forces are less."""
+"""Shift below zero over the geometric mean of eigenvalues of single unknowns, by which the matrix
+of a free body has an inverse; bodies of 100 cells have their first mode at 1e-4 of the largest.
+What is left of a mode is compared with this part of the forces of its single nodes where its own
+forces are less."""
 _OF_LEAST = 1e-2
 """Largest shift over the smallest eigenvalue of single unknowns, which the first mode is below."""
 _ROUNDING = 1e-12
@@ -107,7 +108,8 @@ def natural_modes(
     Args:
         stiffness: K, assembled [N/mm].
         mass: M, symmetric, assembled [t].
-        count: Number of modes; of a pair that the last one belongs to both come back.
+        count: Number of modes, those of least |λ|; of a pair or of a repeated mode that the last
+            one belongs to all come back.
         bcs: Dirichlet conditions; rows and columns that they constrain count in neither matrix,
             whatever stands there.
         preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; nothing is
@@ -158,11 +160,11 @@ def modes_of(
 
     basis = _lowest(problem, count, corrected, start)
     for _ in range(_MOST_REFINED):
-        modes = problem.modes(basis)
+        modes, basis, rest = problem.modes(basis)
         left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
         if left < _LARGEST_RESIDUAL:
             return modes
-        basis = basis - corrected(problem.left(basis))
+        basis = basis - corrected(rest)
     raise _not_found(f"a residual of {left:.1e}", f"{_SEE}, and the preconditioner", _MOST_REFINED)
 
 
@@ -213,10 +215,11 @@ class _Problem:
         shifted.axpy(float(np.clip(_OF_LEAST * self.least, low, high)), self.mass, structure)
         return Factors(shifted, symmetric=self.symmetric)
 
-    def modes(self, basis: Array) -> NaturalModes:
+    def modes(self, basis: Array) -> tuple[NaturalModes, Array, Array]:
         """Return the modes that real vectors span, this rank's rows (m, n), with their residuals.
 
-        The small problem is solved anew: in a larger span eigenvalues have its rounding.
+        The small problem is solved anew: in a larger span eigenvalues have its rounding. Next come
+        the vectors V, now orthonormal, and what they leave of K V = M V A with the best A.
         """
         add = self.comm.allreduce
         forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
@@ -226,32 +229,29 @@ class _Problem:
         matrix, alone = (add(basis.T @ one) for one in (forces, stiff))
         none = _ROUNDING * alone + _ACCURATE**2 * self.largest * np.eye(len(alone))
         turn, same = _groups(matrix, none, symmetric=self.symmetric)
-        shapes, forces, momenta, stiff = (one @ turn for one in (basis, forces, momenta, stiff))
-        among = np.where(same, add(shapes.conj().T @ forces), 0.0)
+        shapes, forces_of, momenta_of, stiff = (
+            one @ turn for one in (basis, forces, momenta, stiff)
+        )
+        among = np.where(same, add(shapes.conj().T @ forces_of), 0.0)
         squares = same @ among.diagonal() / same.sum(axis=1)
         zero = abs(squares) <= _along(none, turn)
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
-        values = np.sqrt(-np.where(zero, 0.0, squares) + 0j)
+        values = np.sqrt(-np.where(zero, 0.0, squares))
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
         # rigid motions have no forces
-        floor = _SHIFT * np.where(zero, self.largest * momenta, stiff)
+        floor = _SHIFT * np.where(zero, self.largest * momenta_of, stiff)
         left, *usual = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
-            for one in (forces - momenta @ among, forces, values**2 * momenta, floor)
+            for one in (forces_of - momenta_of @ among, forces_of, values**2 * momenta_of, floor)
         )
-        return NaturalModes(
+        found = NaturalModes(
             eigenvalues=values[order],
-            shapes=shapes[:, order] + 0j,
-            momenta=momenta[:, order] + 0j,
+            shapes=shapes[:, order],
+            momenta=momenta_of[:, order],
             residuals=(left / sum(usual))[order],
         )
-
-    def left(self, basis: Array) -> Array:
-        """Return what real vectors leave of K V = M V A with the best A, shape (m, n)."""
-        forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
-        small = (self.comm.allreduce(basis.T @ one) for one in (momenta, forces))
-        return np.asarray(forces - momenta @ solve(*small))
+        return found, basis, forces - momenta @ matrix
 
     def _largest(self, values: Array) -> float:
         return float(max(self.comm.allgather(float(values.max(initial=0.0)))))
@@ -385,7 +385,7 @@ def _lowest(
 
     Args:
         problem: K and M.
-        count: Number of modes; of a pair that the last one belongs to both come back.
+        count: Number of modes, see `natural_modes`.
         correct: The preconditioner.
         start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
 
@@ -469,18 +469,23 @@ def _groups(matrix: Array, none: Array, *, symmetric: bool) -> tuple[Array, Flag
     apart = abs(told[:, None] - told) > np.minimum(error[:, None], error)
     label = connected_components(~apart)[1]
     same = label[:, None] == label
-    for group in [] if symmetric else np.unique(same, axis=0):
-        if (size := int(group.sum())) > 1:
-            turn = turn + 0j
-            away = abs(values - values[group].mean())
-            radius = 0.5 * (away[group].max() + away[~group].min(initial=2.0 * away.max() + 1.0))
-            middle = values[group].mean()
-            order = schur(matrix, "complex", sort=lambda one: abs(one - middle) <= radius)[1]
-            turn[:, group] = order[:, :size]
-            if abs(told[group].imag.sum()) <= _REPEATED * abs(told[group].imag).sum():  # a real one
-                both = np.hstack([order[:, :size].real, order[:, :size].imag])
-                turn[:, group] = np.linalg.svd(both)[0][:, :size]
+    turn = turn + 0j
+    for group in [] if symmetric else np.unique(same[same.sum(axis=1) > 1], axis=0):
+        turn[:, group] = _space(matrix, values, group)
     return turn, same
+
+
+def _space(matrix: Array, values: Array, group: Flags) -> Array:
+    """Return orthonormal vectors that span the shapes of some eigenvalues of a matrix, (n, k)."""
+    middle = values[group].mean()
+    away = abs(values - middle)
+    radius = 0.5 * (away[group].max() + away[~group].min(initial=np.inf))
+    whole = schur(matrix, "complex", sort=lambda one: abs(one - middle) <= radius)[1]
+    found = np.asarray(whole[:, : group.sum()])
+    if abs(middle.imag) > away[group].max():
+        return found
+    # no or both members of complex pairs: a real space
+    return np.asarray(np.linalg.svd(np.hstack([found.real, found.imag]))[0][:, : group.sum()])
 
 
 def _along(form: Array, turn: Array) -> Array:

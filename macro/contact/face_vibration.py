@@ -131,7 +131,9 @@ class FaceVibration:
         parts = found.shapes.real, found.shapes.imag
         forces = products(springs, parts[0]) + 1j * products(springs, parts[1])
         squares = np.abs(found.eigenvalues) ** 2
-        work = add(found.shapes.conj().T @ forces) * np.where(squares > 0.0, 1.0 / np.maximum(squares, 1e-300), 0.0)
+        work = add(found.shapes.conj().T @ forces) * np.where(
+            squares > 0.0, 1.0 / np.maximum(squares, 1e-300), 0.0
+        )
         along = add(found.momenta.T @ rigid) / np.sqrt(masses)
         turn = _axes(found.eigenvalues, (along.conj() * _FIRST) @ along.T + _LAST * work)
         found = replace(found, shapes=found.shapes @ turn, momenta=found.momenta @ turn)
