@@ -43,6 +43,9 @@ _REPEATED, _UNSURE = 1e-8, 1e-10
 """Distance of squared frequencies, relative to these, within which they are one that is repeated:
 rounding and loads that are found to a tolerance part them by less. Relative error of stiffness that
 leaves open whether two modes of a face that slides have just merged or are just apart."""
+NEARLY = 2e-5
+"""Distance of squared frequencies, relative to these, within which rounding of the load mixes the
+shapes by more than 1e-8: what they span is accurate, so all or none of them are returned."""
 _NOISE = 1e-14
 """Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
 _BESIDE = 8
@@ -347,7 +350,7 @@ class _Span:
         wanted, kept = (min(size, len(values)) for size in (count, most))
         kept += int(values[kept - 1].imag > 0.0)
         floor = _ROUNDING * self._problem.usual
-        apart = abs(np.diff(values)) > _REPEATED * abs(values[1:]) + floor
+        apart = abs(np.diff(values)) > NEARLY * abs(values[1:]) + floor
         last = kept - int(kept < self._problem.unknowns)  # the next one tells that they converge
         while wanted < kept and (
             values[wanted - 1].imag > 0.0 or (wanted < last and not apart[wanted - 1])

@@ -17,7 +17,7 @@ from patchlaw.geometry import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.eigenmodes import NaturalModes, modes_of
+from patchlaw.macro.eigenmodes import NEARLY, NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, corrections, products
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined_diagonal
@@ -102,7 +102,7 @@ class FaceVibration:
     def modes(self, tangents: Array, count: int) -> tuple[NaturalModes, Array, Array]:
         """Return the lowest modes, and what they do.
 
-        Modes of one frequency are turned to axes of their own, so that they are the same from any
+        Modes of nearly one frequency are turned to axes of their own, so that they are the same from any
         start: the first one moves most along x, the next ones along y and z, and the rest differ
         most in the share of the contact.
 
@@ -130,12 +130,11 @@ class FaceVibration:
         add, (rigid, masses) = self._face.comm.allreduce, self._rigid
         parts = found.shapes.real, found.shapes.imag
         forces = products(springs, parts[0]) + 1j * products(springs, parts[1])
-        squares = np.abs(found.eigenvalues) ** 2
-        work = add(found.shapes.conj().T @ forces) * np.where(
-            squares > 0.0, 1.0 / np.maximum(squares, 1e-300), 0.0
-        )
+        rates = np.where(found.eigenvalues, abs(found.eigenvalues), np.inf)
+        work = add(found.shapes.conj().T @ forces) / np.outer(rates, rates)
         along = add(found.momenta.T @ rigid) / np.sqrt(masses)
-        turn = _axes(found.eigenvalues, (along.conj() * _FIRST) @ along.T + _LAST * work)
+        form = (along.conj() * _FIRST) @ along.T + _LAST * work
+        turn = _axes(found.eigenvalues, add(found.shapes.conj().T @ found.momenta), form)
         found = replace(found, shapes=found.shapes @ turn, momenta=found.momenta @ turn)
         turning = add(abs(parts[1]).sum(axis=0)) > 0.0
         self._latest = np.hstack([parts[0], parts[1][:, turning]])
@@ -168,12 +167,22 @@ class FaceVibration:
         return list(zip(self._bodies, np.split(shapes[: ends[-1]], ends[:-1]), strict=True))
 
 
-def _axes(eigenvalues: Array, form: Array) -> Array:
-    """Return the axes of a Hermitian form of modes among those of one eigenvalue, (n, n)."""
-    turn = np.eye(len(form), dtype=complex)
-    for one in np.unique(eigenvalues):
-        group = np.ix_(*2 * [np.flatnonzero(eigenvalues == one)])
-        turn[group] = np.linalg.eigh(-np.real_if_close(form[group]))[1]
+def _axes(eigenvalues: Array, gram: Array, form: Array) -> Array:
+    """Return axes of a Hermitian form of modes among those of nearly one eigenvalue, (n, n).
+
+    Args:
+        eigenvalues: Those of the modes by rising frequency, shape (n,).
+        gram: Products of the modes by their mass, shape (n, n).
+        form: The form, shape (n, n).
+    """
+    turn = np.zeros_like(form, dtype=complex)
+    apart = abs(np.diff(eigenvalues)) > 0.5 * NEARLY * abs(eigenvalues[1:])
+    label = np.append(0, np.cumsum(apart))
+    for one in range(label[-1] + 1):
+        group = np.ix_(label == one, label == one)
+        scale = np.linalg.inv(np.linalg.cholesky(np.real_if_close(gram[group]))).conj().T
+        along = np.real_if_close(scale.conj().T @ form[group] @ scale)
+        turn[group] = scale @ np.linalg.eigh(-along)[1]
     return turn
 
 
