@@ -41,8 +41,10 @@ CASES = {
     "square": ("Q1", "pointwise", None, None, 10_000),
     "square slides": ("Q1", "pointwise", None, (0.4, 0.4), 0),
 }
-"""Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised. A
-square has one law and no tilt: its modes along the face are repeated."""
+"""Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised.
+
+A square has one law and no tilt: its modes along the face are repeated.
+"""
 
 
 def modes(element, mode, plane, sliding, factorised, *, square):
