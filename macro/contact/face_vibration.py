@@ -102,9 +102,9 @@ class FaceVibration:
     def modes(self, tangents: Array, count: int) -> tuple[NaturalModes, Array, Array]:
         """Return the lowest modes, and what they do.
 
-        Modes of nearly one frequency are turned to axes of their own, so that they are the same from any
-        start: the first one moves most along x, the next ones along y and z, and the rest differ
-        most in the share of the contact.
+        Modes of nearly one frequency are turned to axes of their own, so that they are the same
+        from any start: the first one moves most along x, the next ones along y and z, and the rest
+        differ most in the share of the contact.
 
         Args:
             tangents: Stiffnesses at the samples, see `ContactForces.vibration_tangents`.
