@@ -11,7 +11,8 @@ from typing import Annotated, Any
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.linalg import eigh, solve
+from scipy.linalg import cholesky, eig, eigh, inv, schur
+from scipy.sparse.csgraph import connected_components
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
@@ -20,9 +21,10 @@ from patchlaw.macro.linear_solvers.solvers import Factors
 from patchlaw.support import Array, Count, Flags, Has, Indices, InputError, NotConverged, checked
 
 _SHIFT = 1e-8
-"""Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
-body has an inverse; bodies of 100 cells have their first mode at 1e-4. What is left of a mode is
-compared with this part of the forces of its single nodes where its own forces are less."""
+"""Shift below zero over the geometric mean of eigenvalues of single unknowns, by which the matrix
+of a free body has an inverse; bodies of 100 cells have their first mode at 1e-4 of the largest.
+What is left of a mode is compared with this part of the forces of its single nodes where its own
+forces are less."""
 _OF_LEAST = 1e-2
 """Largest shift over the smallest eigenvalue of single unknowns, which the first mode is below."""
 _ROUNDING = 1e-12
@@ -37,6 +39,13 @@ _ACCURATE, _NEXT = 1e-10, 1e-6
 """Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M, and
 of the mode beyond the wanted ones. With 1e-8 residuals of tetrahedra were 1e-6, for a fifth fewer
 cycles of multigrid."""
+_REPEATED, _UNSURE = 1e-8, 1e-10
+"""Distance of squared frequencies, relative to these, within which they are one that is repeated:
+rounding and loads that are found to a tolerance part them by less. Relative error of stiffness that
+leaves open whether two modes of a face that slides have just merged or are just apart."""
+NEARLY = 2e-5
+"""Distance of squared frequencies, relative to these, within which rounding of the load mixes the
+shapes by more than 1e-8: what they span is accurate, so all or none of them are returned."""
 _NOISE = 1e-14
 """Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
 _BESIDE = 8
@@ -58,11 +67,15 @@ Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "cre
 class NaturalModes:
     """Free vibrations φ exp(λ t) of K u + M ü = 0, by rising frequency.
 
+    Modes whose λ² are equal within 1e-8, or where two modes merge to rounding, are a group: its
+    members have their mean as λ, and shapes that are an orthonormal basis of what they span.
+
     Attributes:
         eigenvalues: λ with an imaginary part not below zero, shape (n,) [1/s].
         shapes: This rank's rows of φ, with φᴴ M φ = 1, shape (m, n).
         momenta: M φ likewise.
-        residuals: |K φ + λ² M φ| / (|K φ| + |λ² M φ|) of the full problem, shape (n,).
+        residuals: |K φ + λ² M φ| / (|K φ| + |λ² M φ|) of the full problem, shape (n,); in a group
+            less the part of K φ in its space.
     """
 
     eigenvalues: Array
@@ -98,7 +111,8 @@ def natural_modes(
     Args:
         stiffness: K, assembled [N/mm].
         mass: M, symmetric, assembled [t].
-        count: Number of modes; of a pair that the last one belongs to both come back.
+        count: Number of modes, those of least |λ|; of a pair or of a repeated mode that the last
+            one belongs to all come back.
         bcs: Dirichlet conditions; rows and columns that they constrain count in neither matrix,
             whatever stands there.
         preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; nothing is
@@ -149,11 +163,11 @@ def modes_of(
 
     basis = _lowest(problem, count, corrected, start)
     for _ in range(_MOST_REFINED):
-        modes = problem.modes(basis)
+        modes, basis, rest = problem.modes(basis)
         left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
         if left < _LARGEST_RESIDUAL:
             return modes
-        basis = basis - corrected(problem.left(basis))
+        basis = basis - corrected(rest)
     raise _not_found(f"a residual of {left:.1e}", f"{_SEE}, and the preconditioner", _MOST_REFINED)
 
 
@@ -184,7 +198,11 @@ class _Problem:
         self.largest = self._largest(ratios)
         if not self.largest > 0.0:
             raise InputError("the stiffness has no positive diagonal, or the mass has none")
-        self.least = 1.0 / self._largest(1.0 / ratios[ratios > 0.0])
+        ratios = ratios[ratios > 0.0]
+        self.least = 1.0 / self._largest(1.0 / ratios)
+        # nodes that are nearly massless would shift the modes of all others
+        size, logs = self.comm.allreduce(np.array([len(ratios), np.log(ratios).sum()]))
+        self.usual = float(np.exp(logs / size))
         diagonal.array[~own] = self._largest(diagonal.array_r)  # what is held has no mass
         self.stiffness.setDiagonal(diagonal)
         self.diagonal = diagonal.array_r
@@ -196,46 +214,47 @@ class _Problem:
         """Return those of K + c M with a small c, as the stiffness of free bodies has none."""
         shifted = self.stiffness.copy()
         structure = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
-        low, high = _ROUNDING * self.largest, _SHIFT * self.largest
+        low, high = _ROUNDING * self.usual, _SHIFT * self.usual
         shifted.axpy(float(np.clip(_OF_LEAST * self.least, low, high)), self.mass, structure)
         return Factors(shifted, symmetric=self.symmetric)
 
-    def modes(self, basis: Array) -> NaturalModes:
+    def modes(self, basis: Array) -> tuple[NaturalModes, Array, Array]:
         """Return the modes that real vectors span, this rank's rows (m, n), with their residuals.
 
-        The small problem is solved anew: in a larger span eigenvalues have its rounding.
+        The small problem is solved anew: in a larger span eigenvalues have its rounding. Next come
+        the vectors V, now orthonormal, and what they leave of K V = M V A with the best A.
         """
         add = self.comm.allreduce
         forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
-        small = [add(basis.T @ one) for one in (forces, momenta)]
-        _, turned = eigh(*small) if self.symmetric else np.linalg.eig(solve(*small[::-1]))
-        turned = turned / np.sqrt(np.einsum("ik,ij,jk->k", turned.conj(), small[1], turned).real)
-        shapes, forces, momenta = (one @ turned for one in (basis, forces, momenta))
-        stiff = self.diagonal[:, None] * shapes
-        squares, alone = (add((shapes.conj() * one).sum(axis=0)) for one in (forces, stiff))
-        zero = abs(squares) <= _ROUNDING * alone.real + _ACCURATE**2 * self.largest
+        scale = inv(cholesky(add(basis.T @ momenta)))  # with which vectors are orthonormal
+        basis, forces, momenta = (one @ scale for one in (basis, forces, momenta))
+        stiff = self.diagonal[:, None] * basis
+        matrix, alone = (add(basis.T @ one) for one in (forces, stiff))
+        none = _ROUNDING * alone + _ACCURATE**2 * self.largest * np.eye(len(alone))
+        turn, same = _groups(matrix, none, symmetric=self.symmetric)
+        shapes, forces_of, momenta_of, stiff = (
+            one @ turn for one in (basis, forces, momenta, stiff)
+        )
+        among = np.where(same, add(shapes.conj().T @ forces_of), 0.0)
+        squares = same @ among.diagonal() / same.sum(axis=1)
+        zero = abs(squares) <= _along(none, turn)
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
-        values = np.sqrt(-np.where(zero, 0.0, squares) + 0j)
+        values = np.sqrt(-np.where(zero, 0.0, squares))
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
         # rigid motions have no forces
-        floor = _SHIFT * np.where(zero, self.largest * momenta, stiff)
+        floor = _SHIFT * np.where(zero, self.largest * momenta_of, stiff)
         left, *usual = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
-            for one in (forces + values**2 * momenta, forces, values**2 * momenta, floor)
+            for one in (forces_of - momenta_of @ among, forces_of, values**2 * momenta_of, floor)
         )
-        return NaturalModes(
+        found = NaturalModes(
             eigenvalues=values[order],
-            shapes=shapes[:, order] + 0j,
-            momenta=momenta[:, order] + 0j,
+            shapes=shapes[:, order],
+            momenta=momenta_of[:, order],
             residuals=(left / sum(usual))[order],
         )
-
-    def left(self, basis: Array) -> Array:
-        """Return what real vectors leave of K V = M V A with the best A, shape (m, n)."""
-        forces, momenta = (products(one, basis) for one in (self.stiffness, self.mass))
-        small = (self.comm.allreduce(basis.T @ one) for one in (momenta, forces))
-        return np.asarray(forces - momenta @ solve(*small))
+        return found, basis, forces - momenta @ matrix
 
     def _largest(self, values: Array) -> float:
         return float(max(self.comm.allgather(float(values.max(initial=0.0)))))
@@ -268,7 +287,7 @@ class _Span:
         return np.asarray((shares.T @ self._parts[0]).T)
 
     def beside(self, columns: Array) -> tuple[Array, Array]:
-        """Return columns less their part in the span as rows (k, m), and their sizes by M (k,).
+        """Return columns less their part in the span, and by M, (2, k, m), and their sizes (k,).
 
         The size is zero where all that is left is rounding.
         """
@@ -280,14 +299,14 @@ class _Span:
         moved = products(self._problem.mass, rows.T).T
         squares = self._add(np.einsum("kn,kn->k", rows, moved))
         lost = (again**2).sum(axis=1)
-        return rows, np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
+        sizes = np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
+        return np.stack([rows, moved]), sizes
 
     def extend(self, rows: Array, sizes: Array) -> None:
         """Take what `beside` returned, as far as it is neither rounding nor copies."""
         if not sizes.any():
             return
-        rows = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
-        momenta = products(self._problem.mass, rows.T).T
+        rows, momenta = rows[:, sizes > 0.0] / sizes[sizes > 0.0, None]
         for _ in range(2):  # vectors that are nearly copies leave 1e-6 of one another at first
             weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
             apart = weights > _COPY * weights[-1]
@@ -328,8 +347,15 @@ class _Span:
         shares = np.where(values.imag < 0.0, shares.imag, shares.real)
         if not self._problem.symmetric:  # modes about to merge are nearly parallel
             shares, _ = np.linalg.qr(shares)
-        ends = [min(size, len(values)) for size in (count, most)]
-        wanted, kept = (end + int(values[end - 1].imag > 0.0) for end in ends)
+        wanted, kept = (min(size, len(values)) for size in (count, most))
+        kept += int(values[kept - 1].imag > 0.0)
+        floor = _ROUNDING * self._problem.usual
+        apart = abs(np.diff(values)) > NEARLY * abs(values[1:]) + floor
+        last = kept - int(kept < self._problem.unknowns)  # the next one tells that they converge
+        while wanted < kept and (
+            values[wanted - 1].imag > 0.0 or (wanted < last and not apart[wanted - 1])
+        ):
+            wanted += 1
         return shares[:, :kept], wanted
 
     def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags]:
@@ -362,7 +388,7 @@ def _lowest(
 
     Args:
         problem: K and M.
-        count: Number of modes; of a pair that the last one belongs to both come back.
+        count: Number of modes, see `natural_modes`.
         correct: The preconditioner.
         start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
 
@@ -391,8 +417,8 @@ def _lowest(
         if known or len(span) == problem.unknowns:
             return span.combined(shares[:, :wanted])
         further = (errors >= limits)[asked]
-        rows, sizes = rows[further], sizes[further]
-        if len(span) + len(rows) > _ROOM * block:
+        rows, sizes = rows[:, further], sizes[further]
+        if len(span) + len(sizes) > _ROOM * block:
             shares = span.restart(shares, past)
         span.extend(rows, sizes)
         past = shares
@@ -412,7 +438,7 @@ def _started(problem: _Problem, block: int, correct: Corrections, start: Array |
     span = _Span(problem, _ROOM * block + first.shape[1] + width)
     for turn in range(_MOST_STARTS):
         random = own * draw.standard_normal((len(own), width))
-        random = correct(products(problem.mass, span.beside(random)[0].T))
+        random = correct(products(problem.mass, span.beside(random)[0][0].T))
         rows, sizes = span.beside(random if turn else np.hstack([first, random]))
         if not (turn or (sizes > 0.0).all()):
             reason = "the preconditioner returns zeros, or what is no number"
@@ -421,6 +447,53 @@ def _started(problem: _Problem, block: int, correct: Corrections, start: Array |
         if len(span) >= min(block, problem.unknowns):
             break
     return span
+
+
+def _groups(matrix: Array, none: Array, *, symmetric: bool) -> tuple[Array, Flags]:
+    """Return the shapes of modes of a matrix in columns, and which are of one group, both (n, n).
+
+    Shapes of a group are orthonormal. Of two modes that have just merged the shapes are parallel,
+    and their distance is the root of an error of the matrix: what they span is accurate.
+
+    Args:
+        matrix: The stiffness of orthonormal vectors, shape (n, n).
+        none: A form of the vectors below which squared frequencies are zero, shape (n, n).
+        symmetric: Whether the matrix is symmetric.
+    """
+    if symmetric:
+        values, turn = eigh(matrix)
+        error = np.full(len(values), _REPEATED)
+    else:
+        values, other, turn = eig(matrix, left=True)
+        parallel = abs((other.conj() * turn).sum(axis=0)) + np.finfo(float).tiny
+        error = np.clip(_UNSURE / parallel, _REPEATED, np.sqrt(_UNSURE))
+    told = np.where(abs(values) <= _along(none, turn), 0.0, values)
+    error = error * abs(told)
+    apart = abs(told[:, None] - told) > np.minimum(error[:, None], error)
+    label = connected_components(~apart)[1]
+    same = label[:, None] == label
+    turn = turn + 0j
+    for group in [] if symmetric else np.unique(same[same.sum(axis=1) > 1], axis=0):
+        turn[:, group] = _space(matrix, values, group)
+    return turn, same
+
+
+def _space(matrix: Array, values: Array, group: Flags) -> Array:
+    """Return orthonormal vectors that span the shapes of some eigenvalues of a matrix, (n, k)."""
+    middle = values[group].mean()
+    away = abs(values - middle)
+    radius = 0.5 * (away[group].max() + away[~group].min(initial=np.inf))
+    whole = schur(matrix, "complex", sort=lambda one: abs(one - middle) <= radius)[1]
+    found = np.asarray(whole[:, : group.sum()])
+    if abs(middle.imag) > away[group].max():
+        return found
+    # no or both members of complex pairs: a real space
+    return np.asarray(np.linalg.svd(np.hstack([found.real, found.imag]))[0][:, : group.sum()])
+
+
+def _along(form: Array, turn: Array) -> Array:
+    """Return the values of a form (n, n) for vectors in columns, shape (k,)."""
+    return np.asarray(np.einsum("ik,ij,jk->k", turn.conj(), form, turn).real)
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

@@ -5,6 +5,7 @@ Theory: section 17 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +17,7 @@ from patchlaw.geometry import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.eigenmodes import NaturalModes, modes_of
+from patchlaw.macro.eigenmodes import NEARLY, NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, corrections, products
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined_diagonal
@@ -25,6 +26,11 @@ from patchlaw.support import Array
 FACTORISED = 20_000
 """Unknowns up to which the stiffness is factorised; beyond, the bodies' multigrid takes less time
 and memory (``benchmarks/vibration_size.py``)."""
+
+
+_FIRST, _LAST = np.array([1.0, 0.6, 0.3]), 0.1
+"""Weights of the motions along x, y and z, and of the contact's share, by which modes of one
+frequency are told apart."""
 
 
 class FaceVibration:
@@ -73,6 +79,14 @@ class FaceVibration:
         free.array[:] = np.concatenate([*own, plane])
         return free
 
+    @cached_property
+    def _rigid(self) -> tuple[Array, Array]:
+        """Unit motions of the bodies along x, y and z, shape (m, 3), and the masses they move."""
+        moved = np.tile(np.eye(3), (self.mass.getLocalSize()[0] // 3 + 1, 1))
+        moved = moved[: self.mass.getLocalSize()[0]]
+        moved[sum(body.owned_dofs for body in self._bodies) :] = 0.0  # the plane
+        return moved, self._face.comm.allreduce((moved * products(self.mass, moved)).sum(axis=0))
+
     @property
     def unknowns(self) -> int:
         """Number of unknowns that are free, of all ranks, and so of modes; collective."""
@@ -85,12 +99,20 @@ class FaceVibration:
         entry = distributed(csr_matrix(np.full((here, 1), value)), here, bodies.comm)
         return joined_diagonal([bodies, entry])
 
-    def modes(self, tangents: Array, count: int) -> tuple[NaturalModes, Array]:
-        """Return the lowest modes, and the share of the contact in their squared frequencies.
+    def modes(self, tangents: Array, count: int) -> tuple[NaturalModes, Array, Array]:
+        """Return the lowest modes, and what they do.
+
+        Modes of nearly one frequency are turned to axes of their own, so that they are the same
+        from any start: the first one moves most along x, the next ones along y and z, and the rest
+        differ most in the share of the contact.
 
         Args:
             tangents: Stiffnesses at the samples, see `ContactForces.vibration_tangents`.
             count: Number of modes.
+
+        Returns:
+            The modes; the share of the contact in their squared frequencies, shape (n,); the mass
+            that moves along x, y and z in them, over that of the bodies, shape (n, 3).
 
         Raises:
             NotConverged: When the iteration fails.
@@ -105,12 +127,19 @@ class FaceVibration:
         if matrix.getSize()[0] > self._factorised:
             correct = self._multigrid(even, matrix.getDiagonal())
         found = modes_of(matrix, self.mass, self._free, count, correct, self._latest)
+        add, (rigid, masses) = self._face.comm.allreduce, self._rigid
         parts = found.shapes.real, found.shapes.imag
-        turning = self._face.comm.allreduce(abs(parts[1]).sum(axis=0)) > 0.0
+        forces = products(springs, parts[0]) + 1j * products(springs, parts[1])
+        rates = np.where(found.eigenvalues, abs(found.eigenvalues), np.inf)
+        work = add(found.shapes.conj().T @ forces) / np.outer(rates, rates)
+        along = add(found.momenta.T @ rigid) / np.sqrt(masses)
+        form = (along.conj() * _FIRST) @ along.T + _LAST * work
+        turn = _axes(found.eigenvalues, add(found.shapes.conj().T @ found.momenta), form)
+        found = replace(found, shapes=found.shapes @ turn, momenta=found.momenta @ turn)
+        turning = add(abs(parts[1]).sum(axis=0)) > 0.0
         self._latest = np.hstack([parts[0], parts[1][:, turning]])
-        work = sum((part * products(springs, part)).sum(axis=0) for part in parts)
-        shares = self._face.comm.allreduce(work) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
-        return found, np.where(found.eigenvalues, shares, 0.0)
+        shares = np.einsum("ik,ij,jk->k", turn.conj(), work, turn).real
+        return found, shares, abs(turn.T @ along) ** 2
 
     def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> Corrections:
         """Return the bodies' multigrid, which knows laws at points as load steps' does.
@@ -132,18 +161,29 @@ class FaceVibration:
 
         return result
 
-    def participation(self, found: NaturalModes) -> Array:
-        """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""
-        moved = np.tile(np.eye(3), (self.mass.getLocalSize()[0] // 3 + 1, 1))[: len(found.momenta)]
-        moved[sum(body.owned_dofs for body in self._bodies) :] = 0.0  # the plane
-        total = (moved * products(self.mass, moved)).sum(axis=0)
-        *along, total = self._face.comm.allreduce(np.vstack([found.momenta.T @ moved, total]))
-        return np.asarray(abs(np.array(along)) ** 2 / total.real)
-
     def by_body(self, shapes: Array) -> list[tuple[ElasticBody, Array]]:
         """Return every body with its rows of shapes (m, n)."""
         ends = np.cumsum([body.owned_dofs for body in self._bodies])
         return list(zip(self._bodies, np.split(shapes[: ends[-1]], ends[:-1]), strict=True))
+
+
+def _axes(eigenvalues: Array, gram: Array, form: Array) -> Array:
+    """Return axes of a Hermitian form of modes among those of nearly one eigenvalue, (n, n).
+
+    Args:
+        eigenvalues: Those of the modes by rising frequency, shape (n,).
+        gram: Products of the modes by their mass, shape (n, n).
+        form: The form, shape (n, n).
+    """
+    turn = np.zeros_like(form, dtype=complex)
+    apart = abs(np.diff(eigenvalues)) > 0.5 * NEARLY * abs(eigenvalues[1:])
+    label = np.append(0, np.cumsum(apart))
+    for one in range(label[-1] + 1):
+        group = np.ix_(label == one, label == one)
+        scale = np.linalg.inv(np.linalg.cholesky(np.real_if_close(gram[group]))).conj().T
+        along = np.real_if_close(scale.conj().T @ form[group] @ scale)
+        turn[group] = scale @ np.linalg.eigh(-along)[1]
+    return turn
 
 
 def mass_matrix(body: ElasticBody) -> PETSc.Mat:

@@ -75,7 +75,7 @@ class VibrationObserver(StepObserver):
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
         with located(key="vibration.modes"):
-            found, shares = self._made.modes(tangents, section.modes)
+            found, shares, moved = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
         # the stiffness of rough contacts goes with their pressure
         uncertain = sum(abs(one) for _, one in step.errors) / (step.force_N or 1.0)
@@ -89,7 +89,7 @@ class VibrationObserver(StepObserver):
             "frequency_error_Hz": whole if step.errors or by_elements is not None else None,
             "damping_per_s": found.damping,
             "contact_share": shares,
-            **dict(zip(_PARTICIPATION, self._made.participation(found).T, strict=True)),
+            **dict(zip(_PARTICIPATION, moved.T, strict=True)),
             "residual": found.residuals,
             "element_error_Hz": by_elements,
         }
@@ -129,7 +129,7 @@ class VibrationObserver(StepObserver):
         there = FaceVibration(face_on(face, other), self._made.mode, plane)
         if there.unknowns < len(frequency):
             return None  # linear elements of a coarse mesh have fewer modes
-        found, _ = there.modes(tangents, len(frequency))
+        found, *_ = there.modes(tangents, len(frequency))
         factor = OF_QUADRATIC if quadratic else OF_LINEAR
         return np.asarray(factor * abs(found.frequencies[: len(frequency)] - frequency))
 

@@ -38,14 +38,20 @@ CASES = {
     "mass": ("P2", "pointwise", 3e-9, None, 0),
     "slides": ("Q1", "patchwise", 2e-9, (0.7, -0.2), 10_000),
     "multigrid slides": ("Q1", "pointwise", None, (0.7, -0.2), 0),
+    "square": ("Q1", "pointwise", None, None, 10_000),
+    "square slides": ("Q1", "pointwise", None, (0.4, 0.4), 0),
 }
-"""Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised."""
+"""Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised.
+
+A square has one law and no tilt: its modes along the face are repeated.
+"""
 
 
-def modes(element, mode, plane, sliding, factorised):
+def modes(element, mode, plane, sliding, factorised, *, square):
     """Return frequencies, damping, participations, and the largest residual."""
     lengths = (1.0, 1.0)
-    shape = BlockShape(interface=lengths, height=1.3, cells=(4, 3, 3), element=element)
+    cells = (3 if square else 4, 3, 3)
+    shape = BlockShape(interface=lengths, height=1.3, cells=cells, element=element)
     material = Material(young_modulus=4000.0, poisson_ratio=0.3, density=2e-9)
     mesh = block_mesh(shape, COMM)
     block = Block(mesh, material)
@@ -58,18 +64,17 @@ def modes(element, mode, plane, sliding, factorised):
             order=2,
         )
         face = replace(face, body=body)
-    problem = LawContactProblem(face, LAWS, mode)
-    state = problem.solve(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
+    problem = LawContactProblem(face, LAWS[:1] * 4 if square else LAWS, mode)
+    state = problem.solve(Control(approach=8e-3, tilt=(0.0, 0.0) if square else (2e-3, -1e-3)))
     along = None if sliding is None else np.array(sliding)
     tangents = problem.forces.vibration_tangents(state, along)
     vibration = FaceVibration(face, mode, plane, factorised)
-    found, shares = vibration.modes(tangents, 6)
-    parts = vibration.participation(found)
+    found, shares, parts = vibration.modes(tangents, 6)
     folder = Path(COMM.bcast(tempfile.mkdtemp()))
     write_shapes(folder / "modes.xdmf", face, found)
     ((body, rows),) = vibration.by_body(found.shapes.real)
     corners, moved = surface_shapes(body, rows)
-    assert moved.shape == (6, *corners.shape)
+    assert moved.shape == (len(shares), *corners.shape)
     whole = np.column_stack([found.frequencies, found.damping, shares, parts])
     facets = len(corners) if (folder / "modes.h5").is_file() else 0
     return whole.tolist(), float(found.residuals.max()), facets
@@ -110,6 +115,6 @@ def springs():
 
 
 if __name__ == "__main__":
-    result = {name: modes(*case) for name, case in CASES.items()}
+    result = {name: modes(*one, square=name[:2] == "sq") for name, one in CASES.items()}
     result |= {"springs": springs(), "scene": scene()}
     tell(result)
