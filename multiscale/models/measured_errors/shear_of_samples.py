@@ -140,9 +140,7 @@ class LawShearProbe(LawErrorProbe):
         answer, pressure = self.answer_errors(), self.pressure_errors()
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
-        shear = {
-            c: np.array([math.hypot(x, y), lost]) for c, (*_, x, y, lost) in answer.items()
-        }
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (*_, x, y, lost) in answer.items()}
         # the shift of the interface and that of the body may err against each other
         along, lost = math.hypot(*self.answer[-3:-1]), self.answer[-1]
         own = min(shear["mesh"][0] / along, 1.0) if along else 0.0  # on the way back through zero
@@ -199,13 +197,18 @@ class LawShearProbe(LawErrorProbe):
         self, end: FaceEquilibrium | StepEnd, problem: LawContactProblem, to: ApproachResponse
     ) -> Array:
         """Return what `LawErrorProbe` compares, the shear and the energy lost, shape (7,)."""
-        assert (shear := end.shear) is not None
+        shear = end.shear
+        assert shear is not None
         along = shear.force if self.by_shift else shear.shift
-        whole, change = self._shear.dissipated, shear.dissipated - self._shear.dissipated
-        if last := whole - self.before.dissipated:  # load steps before err by the same part
+        return np.array([*super()._answer_of(end, problem, to), *along, self._lost(shear)])
+
+    def _lost(self, there: FaceShear) -> float:
+        """Return the energy lost at the end of a load step; those before err by the same part."""
+        whole, change = self._shear.dissipated, there.dissipated - self._shear.dissipated
+        if last := whole - self.before.dissipated:
             share = min(abs(change) / last, 1.0) * min(last / (_TELLS * whole), 1.0)
             change = math.copysign(max(abs(change), share * whole), change)
-        return np.array([*super()._answer_of(end, problem, to), *along, whole + change])
+        return whole + change
 
     def _answered(self, force: Array) -> Array:
         """Return what a change of the shear force changes in the answer, shape (2,)."""
