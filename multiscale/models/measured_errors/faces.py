@@ -1,13 +1,14 @@
 """Errors of load steps on faces under laws of samples, by cause, measured in the run.
 
-Each cause is varied while all others stay, under the plane of the load step: elements of the body
+Each cause is varied while all others stay, under what the load step prescribes: elements of a body
 to first order from the known solution where they are linear, by another one where they are
 quadratic; the laws by what they err at the pressures of the step, see `samples` beside this module,
 and the quadrature by their pressures at more points. One linear solution tells what these change,
 to first order: the response of the contact to the approach, which tells the error of the approach,
 too.
 
-Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+Errors of elements are set in proportion to the changes from linear to quadratic ones, of the force
+as of area, mean gap and stiffness, which are read off the laws at the closures there.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
 (docs/accuracy.md).
 
@@ -51,6 +52,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
     from patchlaw.macro.contact.face_laws import Sampling
     from patchlaw.macro.contact.law_problem import ApproachResponse, StepEnd
+
+    Ended = FaceEquilibrium | StepEnd
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
 """The causes, in their order."""
@@ -447,9 +450,7 @@ class LawErrorProbe(SampleProbe):
         """Return what a problem on another face is solved under, and what was left behind there."""
         return self.control, None
 
-    def _answer_of(
-        self, end: FaceEquilibrium | StepEnd, problem: LawContactProblem, to: ApproachResponse
-    ) -> Array:
+    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
         """Return what is compared at the end of a load step, shape (4,).
 
         It is the force at the approach of the run [N], to first order where the force is

@@ -54,9 +54,10 @@ from patchlaw.multiscale.models.measured_errors.shear import (
 from patchlaw.support import Array, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
+    from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
-    from patchlaw.macro.contact.law_problem import ApproachResponse, LawContactProblem, StepEnd
+    from patchlaw.macro.contact.law_problem import ApproachResponse, LawContactProblem
+    from patchlaw.multiscale.models.measured_errors.faces import Ended
 
 
 _PARTS, _HALVED = 8, 4
@@ -193,9 +194,7 @@ class LawShearProbe(LawErrorProbe):
         problem.sliders.restore(self.before, near=True)
         return control, self.before
 
-    def _answer_of(
-        self, end: FaceEquilibrium | StepEnd, problem: LawContactProblem, to: ApproachResponse
-    ) -> Array:
+    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
         """Return what `LawErrorProbe` compares, the shear and the energy lost, shape (7,)."""
         shear = end.shear
         assert shear is not None
