@@ -90,6 +90,22 @@ class ApproachResponse(NamedTuple):
         return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
 
 
+class StepEnd(NamedTuple):
+    """How a load step ends, to first order; under the same names as of a `FaceEquilibrium`.
+
+    Attributes:
+        approach: The approach [mm].
+        force: The force [N].
+        shear: The shear; None without friction.
+        sample_closure: Closures of this rank's samples, shape (n,) [mm].
+    """
+
+    approach: float
+    force: float
+    shear: FaceShear | None
+    sample_closure: Array
+
+
 class LawContactProblem:
     """A body with contact laws under a rigid plane, solved by Newton's method.
 
@@ -297,7 +313,9 @@ class LawContactProblem:
         self.forces.prescribe(control, self._plane)
         return start, self.forces.closure(start)
 
-    def forces_at(self, known: FaceEquilibrium, body_state: float, to: ApproachResponse) -> Array:
+    def forces_at(
+        self, known: FaceEquilibrium, body_state: float, to: ApproachResponse
+    ) -> tuple[Array, Array]:
         """Return what the laws bear at the displacements of a contact on the same elements.
 
         Pressures are weighted by how closures change with the approach. Their sum on other samples
@@ -310,7 +328,8 @@ class LawContactProblem:
             to: Its response to the approach.
 
         Returns:
-            The weighted force and, with friction, the shear force, shape (1,) or (3,) [N].
+            The weighted force and, with friction, the shear force, shape (1,) or (3,) [N]; and the
+            closures of this rank's samples there, shape (n,) [mm].
 
         Note:
             Collective.
@@ -319,12 +338,27 @@ class LawContactProblem:
         control = self.forces.control
         moved, closure = self._at(known.displacement, known.plane, body_state, shear)
         weight, levers = self.sampling.weight, self.forces.levers
-        closing = levers.matrix @ to.way - self.sampling.displacements(to.moved)
+        closing = self.closing_with(to.way, to.moved.array_r)
         found = [weight @ (closing * self.forces.pressure(closure))]
         if (response := self.forces.respond(closure, moved)) is not None:
             found += (weight @ response.stress).tolist()
         self.forces.prescribe(control, self._plane)
-        return np.asarray(levers.summed(np.array(found)))
+        return np.asarray(levers.summed(np.array(found))), closure
+
+    def closing_with(self, way: Array, moved: Array) -> Array:
+        """Return what a motion of the plane closes all samples of this rank by, shape (n,) [mm].
+
+        Args:
+            way: What it is of 1, x − xc and y − yc, shape (3,).
+            moved: This rank's owned displacements with it, shape (m,) [mm].
+
+        Note:
+            Collective.
+        """
+        displacement = self.equilibrium.body.stiffness.createVecRight()
+        displacement.array[:] = moved
+        closing = self.forces.levers.matrix @ way - self.sampling.displacements(displacement)
+        return np.asarray(closing)
 
     @property
     def past(self) -> Any:
@@ -430,16 +464,13 @@ class LawContactProblem:
 
     def first_order_step(
         self, control: Control, lower: LawContactProblem, before: SliderRecord | None
-    ) -> tuple[float, float, FaceShear | None]:
+    ) -> StepEnd:
         """Return how a load step ends, to first order from the latest guess.
 
         Args:
             control: What the load step prescribes.
             lower: The same problem on linear elements, whose solution the guess is.
             before: What load steps before it left behind of friction, on all ranks; None without.
-
-        Returns:
-            The approach [mm], the force [N] and the shear, None without friction.
 
         Raises:
             NotConverged: When the linear solve fails, or the shear force is not transmitted.
@@ -453,9 +484,7 @@ class LawContactProblem:
         guess.axpy(-1.0, moved)
         return self._end_on(self._lines_at(closure), guess)
 
-    def step_on_lines(
-        self, control: Control, other: LawContactProblem
-    ) -> tuple[float, float, FaceShear | None]:
+    def step_on_lines(self, control: Control, other: LawContactProblem) -> StepEnd:
         """Return how a load step ends on fewer unknowns, to first order from where it ended.
 
         Laws and sliders are lines at the closures and slips of the same samples there.
@@ -463,9 +492,6 @@ class LawContactProblem:
         Args:
             control: What the load step prescribes.
             other: The same problem on more unknowns, at the end of the load step.
-
-        Returns:
-            See `first_order_step`.
 
         Raises:
             NotConverged: When the linear solve fails, or the shear force is not transmitted.
@@ -489,8 +515,8 @@ class LawContactProblem:
     def _lines_at(self, closure: Array) -> Lines:
         return Lines(closure, self.forces.pressure(closure), self.forces.stiffness(closure))
 
-    def _end_on(self, lines: Lines, at: PETSc.Vec) -> tuple[float, float, FaceShear | None]:
-        """Return approach, force and shear of displacements on laws that are lines."""
+    def _end_on(self, lines: Lines, at: PETSc.Vec) -> StepEnd:
+        """Return how a load step ends at displacements on laws that are lines."""
         forces, shear = self.forces, None
         closure = forces.closure_on_lines(self.sampling.displacements(at), lines)
         pressure = lines.at(closure)
@@ -498,7 +524,8 @@ class LawContactProblem:
             pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # springs touch
             found = self.sliders.respond(closure, forces.along(at), pressed, lines.stiffness)
             shear = self.sliders.step(found)[1]
-        return float(forces.plane[0]), float(forces.loads(pressure)[0]), shear
+        force = float(forces.loads(pressure)[0])
+        return StepEnd(float(forces.plane[0]), force, shear, closure)
 
     def _beyond_linear(
         self, control: Control, lower: LawContactProblem

@@ -188,11 +188,26 @@ def start_from_elements(
     Note:
         Collective.
     """
-    parts, pairs = [], zip(bodies_of(before), bodies_of(problem.face), strict=True)
-    whole = before.body.split(known.displacement) if isinstance(before, FacePair) else None
-    for part, (one, other) in zip(whole or [known.displacement], pairs, strict=True):
+    displacement = carried(known.displacement, before, problem.face)
+    problem.start_at(displacement, known.plane, body_state)
+
+
+def carried(displacement: Array, before: ContactFace, face: ContactFace) -> Array:
+    """Return displacements of the bodies of a face at the nodes of other elements.
+
+    Args:
+        displacement: This rank's owned displacements, shape (n,) [mm].
+        before: The face that they are of.
+        face: The face on other elements on the same meshes.
+
+    Note:
+        Collective.
+    """
+    parts, pairs = [], zip(bodies_of(before), bodies_of(face), strict=True)
+    whole = before.body.split(displacement) if isinstance(before, FacePair) else None
+    for part, (one, other) in zip(whole or [displacement], pairs, strict=True):
         parts.append(part if one is other else _carried(part, one, other))
-    problem.start_at(np.concatenate(parts), known.plane, body_state)
+    return np.concatenate(parts)
 
 
 def _carried(displacement: Array, of: Any, to: Any) -> Array:

@@ -1,13 +1,14 @@
 """Errors of load steps on faces under laws of samples, by cause, measured in the run.
 
-Each cause is varied while all others stay, under the plane of the load step: elements of the body
+Each cause is varied while all others stay, under what the load step prescribes: elements of a body
 to first order from the known solution where they are linear, by another one where they are
 quadratic; the laws by what they err at the pressures of the step, see `samples` beside this module,
 and the quadrature by their pressures at more points. One linear solution tells what these change,
 to first order: the response of the contact to the approach, which tells the error of the approach,
 too.
 
-Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+Errors of elements are set in proportion to the changes from linear to quadratic ones, of the force
+as of area, mean gap and stiffness, which are read off the laws at the closures there.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
 (docs/accuracy.md).
 
@@ -28,7 +29,9 @@ import numpy as np
 from patchlaw.geometry import Control
 from patchlaw.geometry.sliders import MOST_REMEMBERED, SliderRecord
 from patchlaw.micro.half_space.error_probe import ZERO
+from patchlaw.micro.model import LEAST_CLOSING
 from patchlaw.multiscale.bodies.bodies import free_bodies
+from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -48,8 +51,10 @@ from patchlaw.support.readable import Caution
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from patchlaw.macro.contact.face_equilibrium import FaceShear
-    from patchlaw.macro.contact.law_problem import ApproachResponse
+    from patchlaw.macro.contact.face_laws import Sampling
+    from patchlaw.macro.contact.law_problem import ApproachResponse, StepEnd
+
+    Ended = FaceEquilibrium | StepEnd
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
 """The causes, in their order."""
@@ -73,11 +78,6 @@ B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
 _OF_FACE_NODE = 30_000.0
 """Memory of two ways of sliders that load steps in parts have come, for each node of the face [B]:
 up to 9 samples, with 60 springs in two directions and some 20 load steps each."""
-_MOVED = 2.0
-"""Errors of area, gap and stiffness under the force over that of the force at the approach,
-relative, where elements and points move pressures about: up to 1.6 on a tilted slab of four
-elements, and up to 1.7 on four bodies drawn at random of cells of 1.5 times their usual length,
-where they were 0.9 to 2.5 at the approach."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,8 +109,8 @@ class LawErrorProbe(SampleProbe):
 
     @cached_property
     def control(self) -> Control:
-        """What prescribes the plane of the load step, by its approach."""
-        return self.problem.same_approach()
+        """What the load step prescribed of the plane."""
+        return self.problem.stated if self.step.by_force else self.problem.same_approach()
 
     def measure(self) -> MeasuredErrors:
         """Measure the errors of the force at the approach.
@@ -125,7 +125,8 @@ class LawErrorProbe(SampleProbe):
         """
         if not self.state.force:
             errors = dict.fromkeys(self.causes, np.zeros(4))
-            force = 0.0 if self.problem.sliders else float(self._by_zero()[0])
+            known = not self.zero or self.step.by_force or self.problem.sliders
+            force = 0.0 if known else float(self._by_zero()[0])
             if force:  # how far it would touch is not known
                 errors[ZERO] = np.array([force, math.inf, self.zero, math.inf])
             return MeasuredErrors(by_cause=errors, stiffness=0.0, zero=self.zero)
@@ -146,9 +147,14 @@ class LawErrorProbe(SampleProbe):
             for cause, error in pressure.items()
         }
         step, force = self.step, self.state.force
-        # where elements and points change pressures, areas and stiffnesses change as these
-        others = {cause: _MOVED * self._going_with(parts[cause] / force) for cause in answer}
-        others[ZERO] = np.zeros(3)
+        area, _, stiffness = self.answer[1:4]
+        sizes = np.array([area or 1.0, 1.0, stiffness or 1.0])
+        # changes may cancel in a mean: at least what the laws say where all pressures err alike
+        others = {
+            cause: np.maximum(error[1:4] / sizes, self._going_with(parts[cause] / force))
+            for cause, error in answer.items()
+        }
+        others[ZERO] = answer[ZERO][1:4] / sizes
         if step.by_force:
             parts[ZERO] = self.response.stiffness * self.zero
         sums = self.response.sampling.patch_sums
@@ -157,11 +163,11 @@ class LawErrorProbe(SampleProbe):
             if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
                 share = self._going_with(float(sums(error).sum()) / force)
                 others[cause] = np.maximum(others[cause], share)
-        if not step.by_force:  # besides, all go with the force
-            others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
-        sizes = [step.contact_area_fraction, 1.0, 1.0]
+            if not step.by_force:  # besides, all go with the force
+                others[cause] = others[cause] + self._going_with(parts[cause] / force)
+        touching = [step.contact_area_fraction, 1.0, 1.0]
         return MeasuredErrors(
-            by_cause={c: np.append(parts[c], others[c] * sizes) for c in self.causes},
+            by_cause={c: np.append(parts[c], others[c] * touching) for c in self.causes},
             stiffness=self.response.stiffness,
             zero=self.zero,
         )
@@ -182,27 +188,45 @@ class LawErrorProbe(SampleProbe):
         if not math.isfinite(share) or not share:
             return errors
         known, sizes = self._as_read, np.ones(3)
-        moved = np.max([abs(self._read_off(by) - known) for by in (share, -share)], axis=0)
+        moved = np.max([abs(self._under(1.0 + by) - known) for by in (share, -share)], axis=0)
         sizes[::2] = known[::2]
         moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
         return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
 
     @cached_property
     def _as_read(self) -> Array:
-        return self._read_off(0.0)
+        return self._under(1.0)
 
-    def _read_off(self, share: float) -> Array:
-        """Return area, gap [mm] and stiffness by the laws under pressures greater by a share.
+    def _under(self, times: float) -> Array:
+        """Return what `_read_off` returns under so many times the pressures; collective."""
+        sampling = self.problem.sampling
+        pressure = max(times, 0.0) * self.state.sample_pressure
+        return self._read_off(self._closures_under(pressure, sampling.patch), sampling)
 
-        They are means over the face; collective.
+    def _read_off(self, closure: Array, sampling: Sampling, closing: Array | None = None) -> Array:
+        """Return area, gap [mm] and stiffness [MPa/mm] by the laws, shape (3,).
+
+        Args:
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            sampling: The samples.
+            closing: What these close in by with the approach. The stiffness is then −dp̄/dū by the
+                mean gap ū, else the mean of those of the laws.
+
+        Note:
+            Collective.
         """
-        sampling = self.response.sampling
-        pressure = np.maximum(1.0 + share, 0.0) * self.state.sample_pressure
-        closure = self._closures_under(pressure, sampling.patch)
-        point = self.table.together().at(sampling.patch, closure, extend=True)
-        found = point.contact_area_fraction, point.separation, point.stiffness
-        whole = sampling.patch_sums(np.ones_like(pressure)).sum()
-        return np.array([sampling.patch_sums(one).sum() for one in found]) / whole
+
+        def mean(values: Array) -> float:
+            return float(sampling.patch_sums(values).sum() / whole)
+
+        laws, whole = self.table.together(), sampling.patch_sums(np.ones_like(closure)).sum()
+        point = laws.at(sampling.patch, closure, extend=True)
+        stiffness = mean(point.stiffness)
+        if closing is not None:
+            closed = -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
+            rates = laws.interface_stiffness(point, sampling.patch)
+            stiffness = mean(closed * rates) / max(mean(closed), LEAST_CLOSING)
+        return np.array([mean(point.contact_area_fraction), mean(point.separation), stiffness])
 
     @property
     def causes(self) -> list[str]:
@@ -383,13 +407,17 @@ class LawErrorProbe(SampleProbe):
             return self._borne(finer)
 
     def _borne(self, problem: LawContactProblem) -> Array:
-        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
-        return problem.forces_at(self.state, self.control.body_state, self.response)
+        """Return what a problem on the same elements bears, in the order of the answer.
 
-    @property
+        See `LawContactProblem.forces_at`.
+        """
+        borne, closure = problem.forces_at(self.state, self.control.body_state, self.response)
+        return np.insert(borne, 1, self._read_on(problem, closure, self.response))
+
+    @cached_property
     def answer(self) -> Array:
-        """What discretisation may be off by: the force, shape (1,) [N]."""
-        return np.array([self.state.force])
+        """What discretisation may be off by; see `_answer_of`."""
+        return self._answer_of(self.state, self.problem, self.response)
 
     def answer_on(
         self, problem: LawContactProblem, *, same: bool = True, nearer: float = 0.0
@@ -405,24 +433,51 @@ class LawErrorProbe(SampleProbe):
         from patchlaw.macro.contact import other_elements as on
 
         control, before = self.load_step(problem)
+        to = self.response
         if not same:
             problem.start_from(self.state.patch_pressure)
         else:
             on.start_from_elements(problem, self.state, self.face, control.body_state)
             more = problem.face.body.dofs - self.face.body.dofs
             if more > 0:
-                return self._answer_of(*problem.first_order_step(control, self.problem, before))
+                end = problem.first_order_step(control, self.problem, before)
+                return self._answer_of(end, problem, to)
             if more < 0:
-                return self._answer_of(*problem.step_on_lines(control, self.problem))
+                return self._answer_of(problem.step_on_lines(control, self.problem), problem, to)
         found = problem.solve(nearer_by(control, nearer))
-        return self._answer_of(found.approach, found.force, found.shear)
+        return self._answer_of(found, problem, to if same else problem.approach_response())
 
     def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
         """Return what a problem on another face is solved under, and what was left behind there."""
         return self.control, None
 
-    def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
-        return np.array([force])
+    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+        """Return what is compared at the end of a load step, shape (4,).
+
+        It is the force at the approach of the run [N], to first order where the force is
+        prescribed, and what is read off the laws: area, gap [mm] and stiffness, over those known.
+        """
+        force = end.force
+        if self.step.by_force:
+            force -= self.response.stiffness * (end.approach - self.state.approach)
+        return np.array([force, *self._read_on(problem, end.sample_closure, to)])
+
+    def _read_on(self, problem: LawContactProblem, closure: Array, to: ApproachResponse) -> Array:
+        """Return what `_read_off` does at closures of a problem.
+
+        Args:
+            problem: The problem.
+            closure: The closures, shape (n,) [mm].
+            to: The response to the approach there, or that of the run on the same meshes.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        sampling, moved = problem.sampling, to.moved.array_r
+        if to is self.response:
+            moved = on.carried(moved, self.face, problem.face)
+        if self.worn:  # the laws are those of the nearest depths: at equal pressures
+            closure = self._closures_under(problem.forces.pressure(closure), sampling.patch)
+        return self._read_off(closure, sampling, problem.closing_with(to.way, moved))
 
 
 def nearer_by(control: Control, distance: float) -> Control:

@@ -56,7 +56,8 @@ from patchlaw.support import Array, NotConverged
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
-    from patchlaw.macro.contact.law_problem import LawContactProblem
+    from patchlaw.macro.contact.law_problem import ApproachResponse, LawContactProblem
+    from patchlaw.multiscale.models.measured_errors.faces import Ended
 
 
 _PARTS, _HALVED = 8, 4
@@ -140,9 +141,9 @@ class LawShearProbe(LawErrorProbe):
         answer, pressure = self.answer_errors(), self.pressure_errors()
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
-        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (*_, x, y, lost) in answer.items()}
         # the shift of the interface and that of the body may err against each other
-        along, lost = math.hypot(*self.answer[1:3]), self.answer[3]
+        along, lost = math.hypot(*self.answer[-3:-1]), self.answer[-1]
         own = min(shear["mesh"][0] / along, 1.0) if along else 0.0  # on the way back through zero
         share = max(own, answer["mesh"][0] / self.state.force)
         shear["mesh"] = np.maximum(shear["mesh"], share * np.array([along, _OF_ENERGY * lost]))
@@ -161,9 +162,7 @@ class LawShearProbe(LawErrorProbe):
 
     def answer_errors(self) -> dict[str, Array]:
         """Return the errors of the answer by elements, quadrature and load steps; collective."""
-        normal = self.response.stiffness if self.step.by_force else 1.0
-        errors = {c: one * [normal, 1.0, 1.0, 1.0] for c, one in super().answer_errors().items()}
-        return errors | {"steps": self._by_steps()}
+        return super().answer_errors() | {"steps": self._by_steps()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
@@ -175,11 +174,6 @@ class LawShearProbe(LawErrorProbe):
 
     # --- the load step on other elements
 
-    @property
-    def answer(self) -> Array:
-        """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
-        return self._answer_of(self.state.approach, self.state.force, self._shear)
-
     def by_points(self) -> Array:
         """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
 
@@ -188,11 +182,10 @@ class LawShearProbe(LawErrorProbe):
         """
         with self._other("the same", lambda face: face) as same:
             whole, other = self._borne(same), self._borne_on_finer()
-        normal, *shear = np.abs(other - whole)
-        borne = max(math.hypot(*whole[1:]), _NO_SHEAR * whole[0]) or 1.0
-        share = min(math.hypot(*shear) / borne, 1.0)
-        normal /= self.response.stiffness if self.step.by_force else 1.0
-        return np.array([normal, *(share * self.answer[1:])])
+        *read, x, y = other - whole
+        borne = max(math.hypot(*whole[-2:]), _NO_SHEAR * whole[0]) or 1.0
+        share = min(math.hypot(x, y) / borne, 1.0)
+        return np.array([*read, *(share * self.answer[-3:])])
 
     def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
         """Return what the load step prescribed; sliders go on as they did in it."""
@@ -201,15 +194,20 @@ class LawShearProbe(LawErrorProbe):
         problem.sliders.restore(self.before, near=True)
         return control, self.before
 
-    def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
+    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+        """Return what `LawErrorProbe` compares, the shear and the energy lost, shape (7,)."""
+        shear = end.shear
         assert shear is not None
-        normal = approach if self.step.by_force else force
         along = shear.force if self.by_shift else shear.shift
-        whole, change = self._shear.dissipated, shear.dissipated - self._shear.dissipated
-        if last := whole - self.before.dissipated:  # load steps before err by the same part
+        return np.array([*super()._answer_of(end, problem, to), *along, self._lost(shear)])
+
+    def _lost(self, there: FaceShear) -> float:
+        """Return the energy lost at the end of a load step; those before err by the same part."""
+        whole, change = self._shear.dissipated, there.dissipated - self._shear.dissipated
+        if last := whole - self.before.dissipated:
             share = min(abs(change) / last, 1.0) * min(last / (_TELLS * whole), 1.0)
             change = math.copysign(max(abs(change), share * whole), change)
-        return np.array([normal, *along, whole + change])
+        return whole + change
 
     def _answered(self, force: Array) -> Array:
         """Return what a change of the shear force changes in the answer, shape (2,)."""
@@ -236,7 +234,7 @@ class LawShearProbe(LawErrorProbe):
     # --- what stresses change, to first order
 
     def _by_steps(self) -> Array:
-        """Return what the load steps err by: force, shear and energy lost, shape (4,)."""
+        """Return what the load steps err by, in the order of the answer, shape (7,)."""
 
         def gone(parts: int) -> tuple[Array, float]:
             stress, lost = self.problem.gone_in_parts(parts)
@@ -251,7 +249,7 @@ class LawShearProbe(LawErrorProbe):
         signed = np.sign(fine - whole) * stress
         further = np.column_stack([np.zeros(len(signed)), signed])
         force, shear = self.problem.changed_by(further)
-        return np.array([abs(force), *np.abs(self._answered(shear)), lost])
+        return np.array([abs(force), *np.zeros(3), *np.abs(self._answered(shear)), lost])
 
     def _whole(self, gone: Callable[[int], tuple[Array, float]]) -> tuple[Array, float]:
         """Return the stresses and the energy lost that whole load steps lead to.

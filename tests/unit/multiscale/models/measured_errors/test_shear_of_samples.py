@@ -30,16 +30,10 @@ def test_paths_on_cells_go_on_from_where_the_load_step_before_has_come(monkeypat
 ])  # fmt: skip
 def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, error):
     shear = SimpleNamespace(dissipated=4.0)
-    probe = SimpleNamespace(
-        _shear=shear,
-        before=SimpleNamespace(dissipated=before),
-        step=SimpleNamespace(by_force=False),
-        by_shift=True,
-    )
-    found = SimpleNamespace(dissipated=there, force=(0.0, 0.0))
+    probe = SimpleNamespace(_shear=shear, before=SimpleNamespace(dissipated=before))
     # 1 of 4 where it is all of the last step, 0.2 of its 1 where that is one of four, at most all;
     # a step that loses a millionth tells a thousandth
-    lost = LawShearProbe._answer_of(probe, 0.0, 1.0, found)[3]
+    lost = LawShearProbe._lost(probe, SimpleNamespace(dissipated=there))
     assert abs(lost - 4.0) == pytest.approx(error)
 
 
