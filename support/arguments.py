@@ -255,8 +255,15 @@ def _taken(value: Any, hint: Any, finite: bool) -> Any:
     """
     if hint is ArrayLike:
         return real_array(value)
-    hint = _meant(hint)
-    return _TAKES.get(get_origin(hint) or hint, _instance)(value, hint, finite)
+    take, meant = _how_taken(hint)
+    return take(value, meant, finite)
+
+
+@cache
+def _how_taken(hint: Any) -> tuple[Callable[[Any, Any, bool], Any], Any]:
+    """Return what takes values of an annotation, and what this stands for."""
+    meant = _meant(hint)
+    return _TAKES.get(get_origin(meant) or meant, _instance), meant
 
 
 def _meant(hint: Any) -> Any:
