@@ -4,7 +4,8 @@ Every row but the first and the last is left out in turn. The laws without it wo
 load step there: on the half-space, under a plane at the same approach. The difference is computed
 to first order. It counts the errors of pressure and of closure alike, by their effect on a load
 step. The intervals on both sides of the row are taken to err by as much, for a kink, where a
-contact begins or two join, may lie in either.
+contact begins or two join, may lie in either. A row that halves an interval tells the same of its
+halves.
 
 Between smooth rows that is too much. The largest part of an expected error that turned up when an
 interval was halved is therefore taken to be the part of all others that are left.
@@ -157,9 +158,11 @@ def refined(
         return Refined(rows, 0.0, np.zeros(len(patches)), np.zeros(len(patches)))
     least = LEAST_LOAD * float(rows.pressure[-1].mean())
     laws, part, found = curves(rows), 0.0, np.zeros(0)
+    halved = np.zeros((len(rows) - 1, 1 + 2 * len(patches)))
     while True:
         left_out = _left_out(curves, laws, rows, compliance, least)
-        expected = np.maximum(left_out[:-1], left_out[1:])  # of intervals
+        # of intervals, by their halving and by the rows on both sides
+        expected = np.maximum(halved, np.maximum(left_out[:-1], left_out[1:]))
         part = _UNSEEN * float(min(found.max(initial=0.0), 1.0) if len(found) else 1.0)
         falls = _falls(rows, initial_separation) / _LARGEST_FALL
         worst = np.maximum(part * _worst(expected), tolerance * falls)
@@ -175,13 +178,15 @@ def refined(
         approaches = np.insert(approaches, split + 1, middle)
         order = np.argsort(np.append(np.arange(len(rows)), split + 0.5))
         rows = rows.joined(new)[order]
-        laws = curves(rows)
+        laws, place = curves(rows), split + 1 + np.arange(len(split))
         stiffness = _stiffness(laws.at(patches, new.approach), compliance)
-        wrong = _worst(errors_at(guess, stiffness, new, compliance, least))
-        before = _worst(expected)[split]
+        errors = errors_at(guess, stiffness, new, compliance, least)
+        wrong, before = _worst(errors), _worst(expected)[split]
         # where laws are exact, as in full contact, an interval is halved for its gap alone
         exact = (wrong > 0.0).astype(float)
         found = np.append(found, np.divide(wrong, before, out=exact, where=before > 0.0))
+        halved = np.insert(halved, split + 1, errors, axis=0)
+        halved[place - 1] = errors
     force, *each = (part * expected.max(axis=0)).tolist()
     pressure, stiffness = np.reshape(each, (2, -1))
     return Refined(rows, force, pressure, stiffness)
