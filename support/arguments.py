@@ -255,17 +255,11 @@ def _taken(value: Any, hint: Any, finite: bool) -> Any:
     """
     if hint is ArrayLike:
         return real_array(value)
-    take, meant = _how_taken(hint)
-    return take(value, meant, finite)
+    hint = _meant(hint)
+    return _TAKES.get(get_origin(hint) or hint, _instance)(value, hint, finite)
 
 
 @cache
-def _how_taken(hint: Any) -> tuple[Callable[[Any, Any, bool], Any], Any]:
-    """Return what takes values of an annotation, and what this stands for."""
-    meant = _meant(hint)
-    return _TAKES.get(get_origin(meant) or meant, _instance), meant
-
-
 def _meant(hint: Any) -> Any:
     """Return what an alias stands for that a statement ``type`` made, as numpy's from 2.5 on."""
     meant = getattr(get_origin(hint) or hint, "__value__", None)

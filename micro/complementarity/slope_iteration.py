@@ -182,10 +182,8 @@ def solved_on_few(
     pressure, used = np.zeros(len(few.cells)), 0
     if start is not None:
         pressure[some] = start.pressure.ravel()[few.cells[some]]
-    compliance, converged = (
-        few.compliance(pressure),
-        max(_CONVERGED_ON_FEW, 3.0 * problem.tolerance),
-    )
+    compliance = few.compliance(pressure)
+    converged = max(_CONVERGED_ON_FEW, 3.0 * problem.tolerance)
     for _ in range(_MOST_ON_FEW):
         part = problem.among(few.cells[some], compliance.among(some))
         try:
@@ -204,13 +202,9 @@ def solved_on_few(
         if changed <= converged:
             everywhere = np.zeros(problem.interference.shape)
             everywhere.ravel()[few.cells] = pressure
-            by_slopes = few.slope_displacement(pressure)
-            found = found._replace(
-                pressure=everywhere,
-                iterations=used,
-                by_slopes=by_slopes,
-                residual=max(found.residual, changed),
-                gap=None,  # of the few cells alone
+            by_slopes, worst = few.slope_displacement(pressure), max(found.residual, changed)
+            found = found._replace(  # gaps are those of the few cells alone
+                pressure=everywhere, iterations=used, by_slopes=by_slopes, residual=worst, gap=None
             )
             lowered = problem if by_slopes is None else problem.lowered_by(by_slopes)
             return found, penetrates_outside(lowered, few.cells[some], everywhere)

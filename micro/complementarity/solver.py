@@ -38,7 +38,7 @@ from patchlaw.micro.complementarity.cell_problem import (
     box_around,
     refined,
 )
-from patchlaw.support import Array, Flags, NotConverged
+from patchlaw.support import Array, Flags, Indices, NotConverged
 
 Place = Any
 """A box of cells, or rows and columns of n cells, shape (n, 1) both: an index of fields."""
