@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol, Self
 
@@ -184,7 +183,7 @@ def press_along(
 
 def _nearby(approach: float, starts: Mapping[float, Start]) -> Start | None:
     """Return what to start from at an approach, by the two solutions nearest to it."""
-    near = heapq.nsmallest(2, starts, key=lambda each: abs(each - approach))
+    near = sorted(starts, key=lambda each: abs(each - approach))[:2]
     if len(near) < 2:
         return starts[near[0]] if near else None
     first, second = near

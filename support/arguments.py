@@ -259,6 +259,7 @@ def _taken(value: Any, hint: Any, finite: bool) -> Any:
     return _TAKES.get(get_origin(hint) or hint, _instance)(value, hint, finite)
 
 
+@cache
 def _meant(hint: Any) -> Any:
     """Return what an alias stands for that a statement ``type`` made, as numpy's from 2.5 on."""
     meant = getattr(get_origin(hint) or hint, "__value__", None)

@@ -235,7 +235,7 @@ _RESIDUAL = 1e-11
 """Residual relative to the load, in the norm of the preconditioned system. On the paper's cube
 displacements of patches were then right to 7e-13 of the largest one; with 1e-9 to 8e-11."""
 _MOST_ITERATIONS = 2000
-_BATCH = 50_000
+_BATCH = 100_000
 """Unknowns times loads that are solved for together, which fit into the caches of a core."""
 
 

@@ -166,15 +166,13 @@ class _SidePair:
             Shape (r, o, cells).
         """
         count = len(self.kernels)
-        means = (np.split(some, 2, axis=1) for some in (rows, others))
-        pairs = zip(*means, strict=True)
-        waves = sum(one @ self.kernels @ other.T for one, other in pairs)
         # waves are cosines: a product is quicker than their transform
         apart = np.arange(self.place[-1] + 1)
         cosines = np.cos(np.pi / (count - 1) * (np.multiply.outer(np.arange(count), apart)))
         cosines *= np.where(np.arange(count) % (count - 1), 1.0, 0.5)[:, None] / (count - 1)
-        lines = waves.reshape(count, -1).T @ cosines
-        return np.asarray(lines.reshape(len(rows), len(others), -1))
+        nodes = np.tensordot(self.kernels, cosines, (0, 0))  # from node to node
+        loaded = [np.tensordot(one, nodes, 1) for one in np.split(rows, 2, axis=1)]
+        return np.asarray(others @ np.concatenate(loaded, axis=1))
 
     def on_patches(self, across: Array, along: Array, row: Indices, cell: Indices) -> Array:
         """Return the displacements of Na × Nb patches by unit pressures on n cells, (Na, Nb, n).

@@ -38,7 +38,7 @@ from patchlaw.micro.complementarity.cell_problem import (
     box_around,
     refined,
 )
-from patchlaw.support import Array, Flags, NotConverged
+from patchlaw.support import Array, Flags, Indices, NotConverged
 
 Place = Any
 """A box of cells, or rows and columns of n cells, shape (n, 1) both: an index of fields."""
@@ -185,15 +185,17 @@ def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> C
     return solution
 
 
-def penetrates_outside(problem: CellProblem, solution: ContactPressures) -> bool:
-    """Return whether cells without pressure penetrate the rigid body, of those it does not overlap.
+def penetrates_outside(problem: CellProblem, cells: Indices, pressure: Array) -> bool:
+    """Return whether other cells than those that were solved for penetrate the rigid body.
 
     Args:
         problem: The contact problem of all cells of a surface, without free motions.
-        solution: The solution, which has pressures where the body overlaps the surface alone.
+        cells: Flat indices of the cells that were solved for, shape (n,).
+        pressure: Pressures of all cells of the surface, shape (nx, ny) [MPa].
     """
-    outside = problem.undeformed <= 0.0
-    return bool(_lifted(problem, outside, problem.interference, solution.pressure).any())
+    outside = np.ones(pressure.shape, bool)
+    outside.ravel()[cells] = False
+    return bool(_lifted(problem, outside, problem.interference, pressure).any())
 
 
 def _lifted(problem: CellProblem, outside: Flags, interference: Array, pressure: Array) -> Flags:

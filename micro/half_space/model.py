@@ -501,7 +501,8 @@ class HalfSpaceModel:
         """
         control, start, _, displaced = load
         motion = control.prescribed(np.zeros(3))
-        interference = self.interference(RigidPlane.moved(self.surface, motion), load.lowered)
+        plane = RigidPlane.moved(self.surface, motion)
+        interference = self.interference(plane, load.lowered)
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
@@ -522,7 +523,7 @@ class HalfSpaceModel:
             assert control.approach is not None
             raise no_gap_left(control.approach, error.beyond) from None
         motion[control.free] = problem.motions.unit * solved.motion
-        return solved, RigidPlane.moved(self.surface, motion)
+        return solved, RigidPlane.moved(self.surface, motion) if control.free.any() else plane
 
     def _nearby(self, start: Start) -> tuple[tuple[Array, Array], ...]:
         """Return what finite slopes add at solutions, and at which interferences; as pairs."""
