@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from patchlaw.micro.half_space.error_probe import error_by_cells
 from patchlaw.micro.transport import (
     conductance_per_area,
     gas_conductance,
@@ -24,7 +25,6 @@ from patchlaw.micro.transport import (
 from patchlaw.multiscale.laws.exported_law import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.micro.half_space.error_probe import error_by_cells
 from patchlaw.multiscale.models.measured_errors.errors import shear_error_notes
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.results.history import History
