@@ -11,33 +11,31 @@ Theory: docs/theory.md, section 13.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
-import scipy
 
 from patchlaw.geometry import Control, Material, Surface
 from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.support import Array, NotConverged
 
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 """Periods along the face, cells along it that the law is solved on, and cells along a period that
 its contacts are solved on at most."""
-_LEAST, _MOST, _ROWS = 0.125, 8.0, 7
-"""Least and largest pressure that the law is known at, over the mean one, and their number."""
-_ROUNDING = 1e-9
-"""Growth of closures, over the largest, that may be rounding."""
-_STEPS, _TOLERANCE, _RESIDUAL = 60, 1e-9, 1e-5
+_STEPS, _TOLERANCE, _RESIDUAL = 60, 1e-9, 1e-4
 """Most steps of Newton's method on the law, its residual, and that of the contacts."""
 
 
-def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> float:
+def edge_width(model: HalfSpaceModel, law: PatchLaw, closure: float, material: Material) -> float:
     """Return the width of the strip along a free edge whose pressure a law errs by [mm].
 
     Args:
         model: The periodic half-space of the sample, without finite slopes.
-        pressure: Mean pressure [MPa].
+        law: The law. Its pressures change from that at the closure as those of the sample do from
+            the same one.
+        closure: Closure, at which the law bears something [mm].
         material: The material that ends at the edge.
 
     Raises:
@@ -55,48 +53,48 @@ def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> fl
     )
     whole = Surface(heights=heights, lengths=lengths)
     face = replace(period, surface=whole, periodic=False, sides=sides)
-    area, perimeter = lengths[0] * lengths[1], 2.0 * sum(lengths)
-    approach, stiffness = _by_law(period, face, pressure)
+    area, pressure = lengths[0] * lengths[1], float(law.pressure(closure))
+    nearer, stiffness = _by_law(law, closure, _compliance_of(sides, model.contact_modulus))
     # far from the edges it is as without end
-    endless = period.press(Control(force=pressure * period.surface.area)).guess
-    values = np.tile(endless.values, (_PERIODS, _PERIODS))
+    endless = period.press(Control(force=pressure * period.surface.area))
+    values = np.tile(endless.guess.values, (_PERIODS, _PERIODS))
     found = []
     for place in ((0, 0), (nx // 2, 0), (0, ny // 2), (nx // 2, ny // 2)):
         moved = replace(face.surface, heights=np.roll(heights, place, axis=(0, 1)))
-        start = replace(endless, values=np.roll(values, place, axis=(0, 1)))
+        start = replace(endless.guess, values=np.roll(values, place, axis=(0, 1)))
         state = replace(face, surface=moved).press(Control(force=pressure * area), start=start)
-        found.append((state.plane.approach - approach) * stiffness / (pressure * perimeter))
-    return float(np.abs(found).max())
+        found.append(state.plane.approach - endless.plane.approach - nearer)
+    return float(np.abs(found).max()) * stiffness * area / (pressure * 2.0 * sum(lengths))
 
 
-def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tuple[float, float]:
-    """Return approach and stiffness of a face under a law, on its own compliance [mm, N/mm].
+def _by_law(law: PatchLaw, closure: float, compliance: Array) -> tuple[float, float]:
+    """Return how much nearer edges let the plane come under a law, and its stiffness there.
 
     Args:
-        period: The sample that the law belongs to.
-        face: A model of the face, which has its lengths, sides and contact modulus.
-        pressure: Mean pressure on the face [MPa].
+        law: The law.
+        closure: Closure without edges [mm].
+        compliance: Displacements of the cells of the face by their pressures [mm/MPa].
+
+    Returns:
+        The distance [mm], and the derivative of the mean pressure [MPa/mm].
     """
-    law, (loads, closures) = _law_of(period, pressure)
-    flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=face.surface.lengths)
-    compliance = _compliance_of(replace(face, surface=flat, highest=None))
-    count = len(compliance)
+    count, pressure = len(compliance), float(law.pressure(closure))
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
-    approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())
+    approach = closure + float((compliance @ pressures).max())
     for _ in range(_STEPS):
-        value, rate = law(approach - compliance @ pressures)
-        if not rate.any():
+        point = law.at(approach - compliance @ pressures, extend=True)
+        if not point.stiffness.any():
             break
-        residual = np.append(pressures - value, pressures.mean() - pressure)
+        residual = np.append(pressures - point.pressure, pressures.mean() - pressure)
         tangent = np.eye(count + 1)
-        tangent[:-1, :-1] += rate[:, None] * compliance
-        tangent[:-1, -1], tangent[-1, :-1], tangent[-1, -1] = -rate, 1.0 / count, 0.0
+        tangent[:-1, :-1] += point.stiffness[:, None] * compliance
+        tangent[:-1, -1], tangent[-1, :-1], tangent[-1, -1] = -point.stiffness, 1.0 / count, 0.0
         change = np.linalg.solve(tangent, residual)
         pressures, approach = pressures - change[:-1], approach - change[-1]
         if np.abs(residual).max() < _TOLERANCE * pressure:
-            rise = np.linalg.solve(np.eye(count) + rate[:, None] * compliance, rate)
-            return float(approach), float(rise.mean() * face.surface.area)
+            rise = np.linalg.solve(tangent[:-1, :-1], point.stiffness)
+            return float(approach) - closure, float(rise.mean())
     raise NotConverged(
         "the law at the edge of a face",
         reason="its pressures were not found",
@@ -105,51 +103,18 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     )
 
 
-def _law_of(
-    period: HalfSpaceModel, pressure: float
-) -> tuple[Callable[[Array], tuple[Array, Array]], tuple[Array, Array]]:
-    """Return the law of a sample, and the pressures and closures of its rows.
-
-    Args:
-        period: The sample.
-        pressure: Mean pressure that it is known around [MPa].
-
-    Returns:
-        A function of closures, which returns pressures and their derivatives, and the rows.
-    """
-    area, most = period.surface.area, _MOST * pressure
-    if period.hardness is not None:
-        most = min(most, 0.95 * period.hardness)
-    loads = np.concatenate([[0.0], np.geomspace(_LEAST * pressure, most, _ROWS)])
-    pressed, start = [period.first_touch], None
-    for load in loads[1:]:
-        state = period.press(Control(force=load * area), start=start)
-        pressed.append(state.plane.approach)
-        start = state.guess
-    closures = np.array(pressed)
-    # next to full contact closures may not grow by more than rounding
-    rising = np.diff(closures, prepend=-np.inf) > _ROUNDING * abs(closures[-1])
-    closures, loads = closures[rising], loads[rising]
-    law = scipy.interpolate.PchipInterpolator(closures, loads)
-    slope = law.derivative()
-
-    def of(closure: Array) -> tuple[Array, Array]:
-        inside = np.clip(closure, closures[0], closures[-1])
-        rate = slope(inside) * (closure > closures[0])
-        return law(inside) + slope(closures[-1]) * np.maximum(closure - closures[-1], 0.0), rate
-
-    return of, (loads, closures)
-
-
-def _compliance_of(cells: HalfSpaceModel) -> Array:
+@lru_cache(maxsize=8)
+def _compliance_of(sides: FreeSides, contact_modulus: float) -> Array:
     """Return the displacements of a quarter of a flat face's cells, shape (n, n) [mm/MPa].
 
     They are those by pressures on each and on its three mirror images.
     """
-    grid, half = cells.compliance.on_grid(cells.surface.grid, cells.surface.spacing), _COARSE // 2
+    flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=sides.lengths)
+    cells = HalfSpaceModel(flat, contact_modulus=contact_modulus, sides=sides)
+    grid, half = cells.compliance.on_grid(flat.grid, flat.spacing), _COARSE // 2
     units = []
     for x, y in np.ndindex(half, half):
-        unit = np.zeros(cells.surface.grid)
+        unit = np.zeros(flat.grid)
         unit[[x, ~x, x, ~x], [y, y, ~y, ~y]] = 1.0
         units.append(grid.displacement(unit)[:half, :half].ravel())
     return np.stack(units, axis=1)

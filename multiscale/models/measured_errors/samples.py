@@ -46,6 +46,8 @@ was 12 to 15 % less with 1.005, 1.05 and 1.2 than with 1.001, 1.002, 1.02 and no
 _PLACES = np.union1d(np.linspace(0.0, 1.0, 401), np.geomspace(1e-12, 1.0, 361))
 """Places on a law, as shares of its range, that its closure under a pressure is read off between:
 close to each other near first touch, where pressures are powers of the closure."""
+_RESIDUAL = 1e-5
+"""Residual of the contacts of samples whose errors are measured, as of those that tell these."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
 
@@ -114,23 +116,27 @@ class SampleCells:
             sample: The sample.
         """
         return ErrorProbe(
-            model=self._flat_model(region, sample),
+            model=replace(self._flat_model(region, sample), tolerance=_RESIDUAL),
             on_body=on_body(None, region.materials, region.above_of(sample)),
             order=SLOPES if self.finite_slopes else 0,
         )
 
-    def edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+    def edge_width_of(
+        self, region: RegionSamples, sample: Surface, law: PatchLaw, closure: float
+    ) -> float:
         """Return the width along the edges of the face that the law of a sample errs by [mm].
 
         Args:
             region: The samples of its region.
             sample: The sample.
-            pressure: Mean pressure [MPa].
+            law: The law.
+            closure: Its closure, at which it bears something [mm].
         """
         if not self.has_edges:
             return 0.0
         try:
-            return edge_width(self._flat_model(region, sample), pressure, region.materials.first)
+            model = self._flat_model(region, sample)
+            return edge_width(model, law, closure, region.materials.first)
         except NotConverged:
             return math.inf
 
@@ -232,7 +238,7 @@ class SampleProbe:
         model = probe.on_body(probe.model, probe.order)
         state, pressure = model.press(Control(approach=approach)), float(law.pressure(closure))
         if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
-            known[2] = self.cells.edge_width_of(region, sample, pressure)
+            known[2] = self.cells.edge_width_of(region, sample, law, float(closure))
         if len(region.surfaces) > 1:
             mean = Control(force=pressure * sample.area)
             known[10:] = _read(model, model.press(mean, start=state.guess)) / sizes

@@ -61,8 +61,9 @@ BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
 seventh and a half of the error, which was 0.36 and 1.05 of that of the normal force."""
-_TOLERANCE = 1e-4
-"""Residual of tractions, and of what they and pressures see of each other, on paths gone again."""
+_TOLERANCE, _OF_PRESSURES = 1e-4, 0.1
+"""Residual of tractions, and of what they and pressures see of each other, on paths gone again, and
+that of pressures over it."""
 FEWEST_CELLS = 16
 """Cells along a side below which half as many show no error."""
 _NORMAL = ("body", "slopes", ZERO)
@@ -453,11 +454,15 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
 
 
 def resampled(
-    probe: ErrorProbe, friction: FrictionModel, grid: tuple[int, int]
+    probe: ErrorProbe,
+    friction: FrictionModel,
+    grid: tuple[int, int],
+    tolerance: float = _TOLERANCE,
 ) -> tuple[HalfSpaceModel, FrictionModel]:
-    """Return the normal contact and its friction on other cells."""
-    normal = probe.on_body(probe.model.resampled(grid), probe.order)
-    tolerance = max(_TOLERANCE, friction.tolerance)
+    """Return the normal contact and its friction on other cells, with residuals of this size."""
+    tolerance, model = max(tolerance, friction.tolerance), probe.model.resampled(grid)
+    model = replace(model, tolerance=max(_OF_PRESSURES * tolerance, model.tolerance))
+    normal = probe.on_body(model, probe.order)
     return normal, replace(friction, spacing=normal.surface.spacing, tolerance=tolerance)
 
 

@@ -74,6 +74,9 @@ coefficient of friction."""
 _TELLS = 1e-3
 """Part of the energy lost from which on what a load step loses tells how much those before err: a
 step in which almost everything sticks may lose all of it or nothing."""
+_RESIDUAL = 1e-3
+"""Residual of tractions on the cells of samples: shift and energy lost of 128² cells differed by
+0.2 and 0.3 % at most from those with a tenth of it."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -402,7 +405,7 @@ class LawShearProbe(LawErrorProbe):
         reference = probe.model.reference_height - sample.mean_height
         friction = self.cells.friction_of(self.samples[number], sample)
         law = self.table.laws[number]
-        normal, own = resampled(probe, friction, sample.grid)
+        normal, own = resampled(probe, friction, sample.grid, _RESIDUAL)
         controls = []
         for reached in paths[number]:
             approach = reference - separation_of(law, reached.closure, reference)
@@ -419,8 +422,9 @@ class LawShearProbe(LawErrorProbe):
             if row and min(sample.grid) // times < FEWEST_CELLS // 4:
                 continue
             try:
-                on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)
-                state, shear = self._gone((number, sample, grid), *on_cells, controls)
+                if row:
+                    normal, own = resampled(probe, friction, grid, _RESIDUAL)
+                state, shear = self._gone((number, sample, grid), normal, own, controls)
             except NotConverged:
                 continue
             # a sample that does not touch where others do counts for nothing
