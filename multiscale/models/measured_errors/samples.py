@@ -116,7 +116,7 @@ class SampleCells:
             sample: The sample.
         """
         return ErrorProbe(
-            model=replace(self._flat_model(region, sample), tolerance=_RESIDUAL),
+            model=self._flat_model(region, sample),
             on_body=on_body(None, region.materials, region.above_of(sample)),
             order=SLOPES if self.finite_slopes else 0,
         )
@@ -235,7 +235,7 @@ class SampleProbe:
         probe, known = self.cells.probe_of(region, sample), np.zeros(_KNOWN)
         reference = probe.model.reference_height - sample.mean_height
         approach = reference - separation_of(law, float(closure), reference)
-        model = probe.on_body(probe.model, probe.order)
+        model = replace(probe.on_body(probe.model, probe.order), tolerance=_RESIDUAL)
         state, pressure = model.press(Control(approach=approach)), float(law.pressure(closure))
         if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
             known[2] = self.cells.edge_width_of(region, sample, law, float(closure))

@@ -61,9 +61,8 @@ BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
 seventh and a half of the error, which was 0.36 and 1.05 of that of the normal force."""
-_TOLERANCE, _OF_PRESSURES = 1e-4, 0.1
-"""Residual of tractions, and of what they and pressures see of each other, on paths gone again, and
-that of pressures over it."""
+_TOLERANCE = 1e-4
+"""Residual of tractions, and of what they and pressures see of each other, on paths gone again."""
 FEWEST_CELLS = 16
 """Cells along a side below which half as many show no error."""
 _NORMAL = ("body", "slopes", ZERO)
@@ -459,10 +458,9 @@ def resampled(
     grid: tuple[int, int],
     tolerance: float = _TOLERANCE,
 ) -> tuple[HalfSpaceModel, FrictionModel]:
-    """Return the normal contact and its friction on other cells, with residuals of this size."""
-    tolerance, model = max(tolerance, friction.tolerance), probe.model.resampled(grid)
-    model = replace(model, tolerance=max(_OF_PRESSURES * tolerance, model.tolerance))
-    normal = probe.on_body(model, probe.order)
+    """Return the normal contact and its friction on other cells, with a residual of tractions."""
+    tolerance = max(tolerance, friction.tolerance)
+    normal = probe.on_body(probe.model.resampled(grid), probe.order)
     return normal, replace(friction, spacing=normal.surface.spacing, tolerance=tolerance)
 
 
