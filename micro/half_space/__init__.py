@@ -4,5 +4,4 @@ HalfSpaceModel           surface, E*, what the body adds       `model`
   └ solve_contact        the contact problem on the cells      `micro.complementarity`
 ContactState             spots, sums over patches, dF/dδ       `read_off`
 ErrorProbe               its errors by cause                   `error_probe`
-edge_width               what periodic samples miss at edges   `edges`
 """

@@ -23,12 +23,12 @@ from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import FiniteSlopes, FrictionModel, HalfSpaceModel
 from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
-from patchlaw.micro.half_space.edges import edge_width
 from patchlaw.micro.half_space.error_probe import ErrorProbe, error_by_cells, read, stated
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
+from patchlaw.multiscale.models.measured_errors.edges import edge_width
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support import Array, NotConverged, shared
 from patchlaw.support.readable import WHOLE, ProgressObserver, unobserved
@@ -46,6 +46,8 @@ was 12 to 15 % less with 1.005, 1.05 and 1.2 than with 1.001, 1.002, 1.02 and no
 _PLACES = np.union1d(np.linspace(0.0, 1.0, 401), np.geomspace(1e-12, 1.0, 361))
 """Places on a law, as shares of its range, that its closure under a pressure is read off between:
 close to each other near first touch, where pressures are powers of the closure."""
+_RESIDUAL = 1e-5
+"""Residual of the contacts of samples whose errors are measured, as of those that tell these."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
 
@@ -119,18 +121,22 @@ class SampleCells:
             order=SLOPES if self.finite_slopes else 0,
         )
 
-    def edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+    def edge_width_of(
+        self, region: RegionSamples, sample: Surface, law: PatchLaw, closure: float
+    ) -> float:
         """Return the width along the edges of the face that the law of a sample errs by [mm].
 
         Args:
             region: The samples of its region.
             sample: The sample.
-            pressure: Mean pressure [MPa].
+            law: The law.
+            closure: Its closure, at which it bears something [mm].
         """
         if not self.has_edges:
             return 0.0
         try:
-            return edge_width(self._flat_model(region, sample), pressure, region.materials.first)
+            model = self._flat_model(region, sample)
+            return edge_width(model, law, closure, region.materials.first)
         except NotConverged:
             return math.inf
 
@@ -229,10 +235,10 @@ class SampleProbe:
         probe, known = self.cells.probe_of(region, sample), np.zeros(_KNOWN)
         reference = probe.model.reference_height - sample.mean_height
         approach = reference - separation_of(law, float(closure), reference)
-        model = probe.on_body(probe.model, probe.order)
+        model = replace(probe.on_body(probe.model, probe.order), tolerance=_RESIDUAL)
         state, pressure = model.press(Control(approach=approach)), float(law.pressure(closure))
         if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
-            known[2] = self.cells.edge_width_of(region, sample, pressure)
+            known[2] = self.cells.edge_width_of(region, sample, law, float(closure))
         if len(region.surfaces) > 1:
             mean = Control(force=pressure * sample.area)
             known[10:] = _read(model, model.press(mean, start=state.guess)) / sizes

@@ -456,11 +456,14 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
 
 
 def resampled(
-    probe: ErrorProbe, friction: FrictionModel, grid: tuple[int, int]
+    probe: ErrorProbe,
+    friction: FrictionModel,
+    grid: tuple[int, int],
+    tolerance: float = _TOLERANCE,
 ) -> tuple[HalfSpaceModel, FrictionModel]:
-    """Return the normal contact and its friction on other cells."""
+    """Return the normal contact and its friction on other cells, with a residual of tractions."""
+    tolerance = max(tolerance, friction.tolerance)
     normal = probe.on_body(probe.model.resampled(grid), probe.order)
-    tolerance = max(_TOLERANCE, friction.tolerance)
     return normal, replace(friction, spacing=normal.surface.spacing, tolerance=tolerance)
 
 

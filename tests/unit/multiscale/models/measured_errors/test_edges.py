@@ -8,9 +8,10 @@ import pytest
 
 from patchlaw.geometry import Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.half_space import edges as edge_errors
-from patchlaw.micro.half_space.edges import edge_width
-from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale import Scene, representative_law, run
+from patchlaw.multiscale.models.measured_errors import edges as edge_errors
+from patchlaw.multiscale.models.measured_errors.edges import edge_width
+from patchlaw.multiscale.models.measured_errors.samples import closure_under
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, Decision
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
@@ -23,9 +24,22 @@ def sample(cells=24):
     return HalfSpaceModel(surface, contact_modulus=MATERIAL.contact_modulus, periodic=True)
 
 
+def width_of(model, pressure=PRESSURE):
+    """Return the width by the law of the cells of the sample themselves."""
+    most = min(2.0 * pressure, 0.95 * (model.hardness or np.inf))
+    law = representative_law(
+        [model.surface],
+        MATERIAL.contact_modulus,
+        largest_pressure=most,
+        tolerance=0.05,
+        make_model=lambda _: model,
+    )
+    return edge_width(model, law, float(closure_under(law, np.array(pressure))), MATERIAL)
+
+
 def test_width_is_a_share_of_the_distance_of_contacts_at_any_size():
     model = sample()
-    width = edge_width(model, PRESSURE, MATERIAL)
+    width = width_of(model)
     assert 0.0 < width < 0.5 / SPECTRUM["waves"][0]
     surface = model.surface.scaled(10.0)
     larger = HalfSpaceModel(
@@ -33,22 +47,22 @@ def test_width_is_a_share_of_the_distance_of_contacts_at_any_size():
         contact_modulus=MATERIAL.contact_modulus,
         periodic=True,
     )
-    assert edge_width(larger, PRESSURE, MATERIAL) == pytest.approx(10.0 * width, rel=1e-6)
+    assert width_of(larger) == pytest.approx(10.0 * width, rel=1e-6)
 
 
 def test_width_belongs_to_the_edge_and_not_to_the_face(monkeypatch):
     """A face of three periods has 1.5 times the edges of one of two, on 2.25 times the area."""
-    width = edge_width(sample(), PRESSURE, MATERIAL)
+    width = width_of(sample())
     monkeypatch.setattr(edge_errors, "_PERIODS", 3)
     monkeypatch.setattr(edge_errors, "_COARSE", 24)
     # 0.78 to 0.85 on four surfaces, as corners soften the smaller face more
-    assert 0.7 < edge_width(sample(), PRESSURE, MATERIAL) / width < 0.9
+    assert 0.7 < width_of(sample()) / width < 0.9
 
 
 def test_width_is_known_where_nearly_all_yields():
     """The law is known up to 0.95 of the hardness, and goes on as a line."""
     model = replace(sample(), hardness=PRESSURE / 0.97)
-    assert 0.0 < edge_width(model, PRESSURE, MATERIAL) < 0.5 / SPECTRUM["waves"][0]
+    assert 0.0 < width_of(model) < 0.5 / SPECTRUM["waves"][0]
 
 
 @pytest.mark.long
@@ -57,7 +71,7 @@ def test_width_does_not_jump_near_the_hardness():
     model = replace(sample(12), hardness=PRESSURE / 0.95)
     for power in (2, 3):
         at = PRESSURE / 8.0 * 2.0**power
-        below, above = (edge_width(model, at * (1.0 + step), MATERIAL) for step in (-1e-6, 1e-6))
+        below, above = (width_of(model, at * (1.0 + step)) for step in (-1e-6, 1e-6))
         assert above == pytest.approx(below, rel=1e-3)  # 1 to 4e-4 by the step itself
 
 
