@@ -4,10 +4,10 @@ Laws of a face lie between those of surfaces that have worn by some depths. The 
 roughness under a point is the depth W that has worn off there, volume per area. Surfaces that wore
 to the same depth under pressures of 1 to 4 have nearly the same law, and those that slid the same
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
-changes its shape with W. Between two depths its closure is interpolated linearly at equal pressure,
-as curves that are steep lie beside each other; beyond the last depth it stays. Patches of one
-surface, which share their load, wear with the distance that all of it has slid; their laws are
-taken along the path of the plane.
+changes its shape with W, fast at first and ever more slowly. Between two depths its closure at equal
+pressure, as curves that are steep lie beside each other, is linear in log(1 + W/W₁), W₁ the first
+of them; beyond the last it stays. Patches of one surface, which share their load, wear with the
+distance that all of it has slid; their laws are taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
 """
@@ -134,7 +134,7 @@ class RunningInLaws:
     ) -> Array:
         """Return the transmissivities of a law, shape (n, 2) [mm³], with one cause of error varied.
 
-        Hydraulic gaps are linear between those of two depths.
+        Hydraulic gaps lie between those of two depths as closures do.
 
         Args:
             index: Number of the law.
@@ -150,10 +150,10 @@ class RunningInLaws:
         if len(flows) < len(self._flows):
             raise InputError("the law has no transmissivity", allowed="a law made with leak = True")
         gaps = np.cbrt([flow.varied(cause, separation, samples) for flow in flows])
-        at = np.interp(depth, self._depths[:, index], np.arange(len(gaps)))
-        below, every = np.minimum(at.astype(np.intp), len(gaps) - 2), np.arange(len(at))
-        low, high = gaps[below, every], gaps[below + 1, every]
-        return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
+        every = np.arange(len(depth))
+        level, share, *_ = _between(self._depths[:, [index]], depth, every)
+        low, high = gaps[level, every], gaps[level + 1, every]
+        return np.asarray((low + share[:, None] * (high - low)) ** 3)
 
     def transmissivities(
         self, patch: Indices, closure: Array, depth: Array, places: Array | None = None
@@ -402,12 +402,16 @@ Between = tuple[Indices, Array, Array, Indices]
 
 
 def _between(levels: Array, depth: Array, law: Indices) -> Between:
-    """Return where depths lie between levels, which rise or stay, shape (L, n) [mm]."""
+    """Return where depths lie between levels, which rise from 0, shape (L, n) or (L, 1) [mm].
+
+    Shares of the way are in logarithms, as levels double.
+    """
     level = np.clip((levels <= depth).sum(axis=0) - 1, 0, len(levels) - 2)
     low, high = np.take_along_axis(levels, np.array([level, level + 1]), axis=0)
-    inside = depth < high
-    width = np.where(inside, high - low, 1.0)
-    return level, np.where(inside, (depth - low) / width, 1.0), inside / width, law
+    inside, first = depth < high, levels[1]
+    width = np.where(inside, np.log((first + high) / (first + low)), 1.0)
+    share = np.where(inside, np.log((first + depth) / (first + low)) / width, 1.0)
+    return level, share, inside / (width * (first + depth)), law
 
 
 class _Curves(NamedTuple):
@@ -459,6 +463,7 @@ def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
         curves.append(scipy.interpolate.PchipInterpolator(q, rows_at, axis=1))
         ends.append(closure[-1])
     grid = reduce(np.union1d, [curve.x for curve in curves])
+    grid = grid[np.append(np.diff(grid) > ROUNDING * grid[1:], True)]  # tables end alike
     found = [_tabulated(curve, grid) for curve in curves]
     values, slopes = (np.stack(one, axis=1) for one in zip(*found, strict=True))
     return _Curves(grid, values, slopes, np.array(ends))
