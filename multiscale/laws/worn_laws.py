@@ -4,9 +4,9 @@ Laws of a face lie between those of surfaces that have worn by some depths. The 
 roughness under a point is the depth W that has worn off there, volume per area. Surfaces that wore
 to the same depth under pressures of 1 to 4 have nearly the same law, and those that slid the same
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
-changes its shape with W, fast at first and ever more slowly. Between two depths its closure at equal
-pressure, as curves that are steep lie beside each other, is linear in log(1 + W/W₁), W₁ the first
-of them; beyond the last it stays. Patches of one surface, which share their load, wear with the
+changes its shape with W, fast at first and ever more slowly. Between two depths its closure at
+equal pressure, as curves that are steep lie beside each other, is linear in log(1 + W/W₁), W₁ the
+first of them; beyond the last it stays. Patches of one surface, which share their load, wear with the
 distance that all of it has slid; their laws are taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
@@ -110,12 +110,8 @@ class RunningInLaws:
             between = _between(self._depths[:, patch[at]], deep, self._row[patch[at]])
             grid, q = self._grid[between[-1]], np.maximum(pressure[at], 0.0) ** (2 / 3)
             piece = np.clip((grid <= q[:, None]).sum(axis=1) - 1, 0, grid.shape[1] - 2)
-            every = np.arange(len(q))
-            start, end = grid[every, piece], grid[every, piece + 1]
-            width = end - start
-            ends = [_blended(self._values[0], between, one) for one in (piece, piece + 1)]
-            ways = [width * _blended(self._slopes[0], between, one) for one in (piece, piece + 1)]
-            value, slope = _hermite((q - start) / width, *ends, *ways)
+            start, width, closures = self._pieces(between, piece, 0)
+            value, slope = _hermite((q - start) / width, *closures)
             found[:, at] = value, 1.5 * np.sqrt(q) * width / np.maximum(slope, 1e-300)
         return found[0], found[1]
 
@@ -210,6 +206,15 @@ class RunningInLaws:
                 allowed=f"closure up to {ends[worst]:.6g} mm",
             )
 
+    def _pieces(
+        self, between: Between, piece: Indices, which: Any = slice(None)
+    ) -> tuple[Any, ...]:
+        """Return where pieces of the grid start, their widths, and the cubics of columns there."""
+        (start, end), both = self._grid[between[-1], [piece, piece + 1]], (piece, piece + 1)
+        width, columns = end - start, (self._values[which], self._slopes[which])
+        values, slopes = ([_blended(one, between, at) for at in both] for one in columns)
+        return start, width, values + [width * one for one in slopes]
+
     def _of_touched(self, closure: Array, between: Between) -> Array:
         """Return the fields of `LawPoint`, and the derivative of the pressure by the depth.
 
@@ -218,34 +223,26 @@ class RunningInLaws:
             between: Where depths lie between the levels.
         """
         level, _, rate, row = between
-        grid, last = self._grid[row], self._grid.shape[1] - 1
-        each, low = np.arange(len(closure)), np.zeros(len(closure), np.intp)
+        last, low = self._grid.shape[1] - 1, np.zeros(len(closure), np.intp)
         high = np.full(len(closure), last)
         for _ in range(last.bit_length() + 1):
             middle = (low + high) // 2
             below = _blended(self._values[0], between, middle) <= closure
             low, high = np.where(below, middle, low), np.where(below, high, middle)
         piece = np.minimum(low, last - 1)
-        start, width = grid[each, piece], grid[each, piece + 1] - grid[each, piece]
-        ends = [_blended(self._values, between, at) for at in (piece, piece + 1)]
-        tangents = [width * _blended(self._slopes, between, at) for at in (piece, piece + 1)]
-        t = _inverted(closure, *(one[0] for one in (*ends, *tangents)))
-        value, slope = _hermite(t, *ends, *tangents)
+        start, width, cubics = self._pieces(between, piece)
+        t = _inverted(closure, *(one[0] for one in cubics))
+        value, slope = _hermite(t, *cubics)
         slope = slope / width
         q = start + t * width
         touched = q > 0.0
         pressure = np.where(touched, q, 0.0) ** 1.5
         stiffness = 1.5 * np.sqrt(np.where(touched, q, 0.0)) / np.maximum(slope[0], 1e-300)
-        steps = [
-            _hermite(t, *(one[0, level + up, row, piece + right] * scale for one, right, scale in (
-                (self._values, 0, 1.0), (self._values, 1, 1.0),
-                (self._slopes, 0, width), (self._slopes, 1, width),
-            )))[0]
-            for up in (0, 1)
-        ]  # fmt: skip
+        levels = ((level, np.full_like(t, up), rate, row) for up in (0.0, 1.0))
+        steps = [_hermite(t, *self._pieces(one, piece, 0)[2])[0] for one in levels]
         by_depth = -rate * (steps[1] - steps[0]) * stiffness
         per_closure = np.where(touched, slope[2] / np.maximum(slope[0], 1e-300), -1.0)
-        gap = np.where(touched, value[2], ends[0][2] + ends[0][0] - closure)
+        gap = np.where(touched, value[2], cubics[0][2] + cubics[0][0] - closure)
         area, contacts = (np.where(touched, value[k], 0.0) for k in (1, 3))
         area = np.clip(area, 0.0, 1.0)  # tangents beyond the tables may leave it
         one = np.ones_like(closure)
@@ -320,8 +317,7 @@ class SlidLaws:
         place = float(np.interp(slid, distances, np.arange(len(distances))))
         below, share = int(place), place % 1.0
         if share and rate is not None:
-            two = (below, below + 1)
-            ends = [SlidLaws(levels[one : one + 1], distances[one], lean) for one in two]
+            ends = [SlidLaws([levels[one]], distances[one], lean) for one in (below, below + 1)]
             share = worn_share(share, float(np.diff(distances)[below]), ends, rate)
         parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
         self._parts, self.slid, self._lean = parts[: 1 + (share > 0.0)], slid, lean

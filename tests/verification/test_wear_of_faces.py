@@ -358,7 +358,7 @@ def test_laws_run_in_as_the_cells_that_they_are_made_of(seed):
 @pytest.mark.slow  # on quadratic elements: 10 s each
 @pytest.mark.parametrize("seed", [1, 4])
 def test_a_face_under_laws_runs_in_as_its_cells(seed):
-    """A tilted map of few waves is no sample of itself: laws are as far off as those of new ones."""
+    """A tilted map of few waves is no sample of itself: laws err as when they are new."""
     off = differences(seed, cells=32)
     bounds = {"approach_mm": 0.02, "contact_area_fraction": 0.04, "mean_separation_mm": 0.03}
     for name, most in (bounds | {"worn_volume_mm3": 1e-9}).items():
