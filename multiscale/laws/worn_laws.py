@@ -6,8 +6,8 @@ to the same depth under pressures of 1 to 4 have nearly the same law, and those 
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
 changes its shape with W, fast at first and ever more slowly. Between two depths its closure at
 equal pressure, as curves that are steep lie beside each other, is linear in log(1 + W/W₁), W₁ the
-first of them; beyond the last it stays. Patches of one surface, which share their load, wear with the
-distance that all of it has slid; their laws are taken along the path of the plane.
+first of them; beyond the last it stays. Patches of one surface, which share their load, wear with
+the distance that all of it has slid; their laws are taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
 """

@@ -350,7 +350,7 @@ def test_what_does_not_wear():
 def test_laws_run_in_as_the_cells_that_they_are_made_of(seed):
     """Evenly pressed faces differ by what laws lose between two depths, and by first contacts."""
     off = differences(seed, even=True, cells=32)
-    bounds = {"contact_area_fraction": 0.015, "mean_separation_mm": 0.01, "worn_volume_mm3": 1e-9}
+    bounds = {"contact_area_fraction": 0.015, "mean_separation_mm": 0.015, "worn_volume_mm3": 1e-9}
     for name, most in bounds.items():
         assert np.abs(off[name]).max() < most, name
 
