@@ -5,9 +5,9 @@ roughness under a point is the depth W that has worn off there, volume per area.
 to the same depth under pressures of 1 to 4 have nearly the same law, and those that slid the same
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
 changes its shape with W, fast at first and ever more slowly. Between two depths its closure at
-equal pressure, as curves that are steep lie beside each other, is linear in log(1 + W/W₁), W₁ the
-first of them; beyond the last it stays. Patches of one surface, which share their load, wear with
-the distance that all of it has slid; their laws are taken along the path of the plane.
+equal pressure, as curves that are steep lie beside each other, is linear in log W, and in W up to
+the first; beyond the last it stays. Patches of one surface, which share their load, wear with the
+distance that all of it has slid; their laws are taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
 """
@@ -400,14 +400,18 @@ Between = tuple[Indices, Array, Array, Indices]
 def _between(levels: Array, depth: Array, law: Indices) -> Between:
     """Return where depths lie between levels, which rise from 0, shape (L, n) or (L, 1) [mm].
 
-    Shares of the way are in logarithms, as levels double.
+    Shares of the way are in logarithms, as levels double, but for the first.
     """
     level = np.clip((levels <= depth).sum(axis=0) - 1, 0, len(levels) - 2)
     low, high = np.take_along_axis(levels, np.array([level, level + 1]), axis=0)
     inside, first = depth < high, levels[1]
-    width = np.where(inside, np.log((first + high) / (first + low)), 1.0)
-    share = np.where(inside, np.log((first + depth) / (first + low)) / width, 1.0)
-    return level, share, inside / (width * (first + depth)), law
+    start, part, end = (
+        np.minimum(one / first - 1.0, np.log(np.maximum(one / first, 1.0)))
+        for one in (low, depth, high)
+    )
+    width = np.where(inside, end - start, 1.0)
+    share = np.where(inside, (part - start) / width, 1.0)
+    return level, share, inside / (width * np.maximum(first, depth)), law
 
 
 class _Curves(NamedTuple):
