@@ -243,6 +243,7 @@ class PressedPlane:
         behind = np.zeros_like(closure) if behind is None else behind
         high = self.laws.pressures(patch, closure, worn)
         low, pressure = np.zeros_like(high), np.fmin(self._borne[some], high)
+        high = np.nextafter(high, np.inf)  # steps to either end once tried would go to and fro
         stiffness, left = np.empty_like(high), np.arange(len(high))
         for _ in range(_MOST_WEARING):
             further, moved = wearing[left] * pressure[left], behind[left] * pressure[left]
@@ -255,7 +256,7 @@ class PressedPlane:
             low[left] = np.where(missing > 0.0, pressure[left], low[left])
             high[left] = np.where(missing < 0.0, pressure[left], high[left])
             newton, lowest, highest = pressure[left] + missing / gives, low[left], high[left]
-            inside = (newton >= lowest) & (newton <= highest)
+            inside = (newton > lowest) & (newton < highest) | (newton == pressure[left])
             pressure[left] = np.where(inside, newton, 0.5 * (lowest + highest))
             stiffness[left] = slope / gives
             left = left[np.abs(missing) > rounding]

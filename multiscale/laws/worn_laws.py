@@ -4,10 +4,10 @@ Laws of a face lie between those of surfaces that have worn by some depths. The 
 roughness under a point is the depth W that has worn off there, volume per area. Surfaces that wore
 to the same depth under pressures of 1 to 4 have nearly the same law, and those that slid the same
 distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
-changes its shape with W. Between two depths its closure is interpolated linearly at equal pressure,
-as curves that are steep lie beside each other; beyond the last depth it stays. Patches of one
-surface, which share their load, wear with the distance that all of it has slid; their laws are
-taken along the path of the plane.
+changes its shape with W, fast at first and ever more slowly. Between two depths its closure at
+equal pressure, as curves that are steep lie beside each other, is linear in log W, and in W up to
+the first; beyond the last it stays. Patches of one surface, which share their load, wear with the
+distance that all of it has slid; their laws are taken along the path of the plane.
 
 Theory: docs/theory.md, sections 10 and 18.
 """
@@ -110,12 +110,8 @@ class RunningInLaws:
             between = _between(self._depths[:, patch[at]], deep, self._row[patch[at]])
             grid, q = self._grid[between[-1]], np.maximum(pressure[at], 0.0) ** (2 / 3)
             piece = np.clip((grid <= q[:, None]).sum(axis=1) - 1, 0, grid.shape[1] - 2)
-            every = np.arange(len(q))
-            start, end = grid[every, piece], grid[every, piece + 1]
-            width = end - start
-            ends = [_blended(self._values[0], between, one) for one in (piece, piece + 1)]
-            ways = [width * _blended(self._slopes[0], between, one) for one in (piece, piece + 1)]
-            value, slope = _hermite((q - start) / width, *ends, *ways)
+            start, width, closures = self._pieces(between, piece, 0)
+            value, slope = _hermite((q - start) / width, *closures)
             found[:, at] = value, 1.5 * np.sqrt(q) * width / np.maximum(slope, 1e-300)
         return found[0], found[1]
 
@@ -134,7 +130,7 @@ class RunningInLaws:
     ) -> Array:
         """Return the transmissivities of a law, shape (n, 2) [mm³], with one cause of error varied.
 
-        Hydraulic gaps are linear between those of two depths.
+        Hydraulic gaps lie between those of two depths as closures do.
 
         Args:
             index: Number of the law.
@@ -150,10 +146,10 @@ class RunningInLaws:
         if len(flows) < len(self._flows):
             raise InputError("the law has no transmissivity", allowed="a law made with leak = True")
         gaps = np.cbrt([flow.varied(cause, separation, samples) for flow in flows])
-        at = np.interp(depth, self._depths[:, index], np.arange(len(gaps)))
-        below, every = np.minimum(at.astype(np.intp), len(gaps) - 2), np.arange(len(at))
-        low, high = gaps[below, every], gaps[below + 1, every]
-        return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
+        every = np.arange(len(depth))
+        level, share, *_ = _between(self._depths[:, [index]], depth, every)
+        low, high = gaps[level, every], gaps[level + 1, every]
+        return np.asarray((low + share[:, None] * (high - low)) ** 3)
 
     def transmissivities(
         self, patch: Indices, closure: Array, depth: Array, places: Array | None = None
@@ -210,6 +206,15 @@ class RunningInLaws:
                 allowed=f"closure up to {ends[worst]:.6g} mm",
             )
 
+    def _pieces(
+        self, between: Between, piece: Indices, which: Any = slice(None)
+    ) -> tuple[Any, ...]:
+        """Return where pieces of the grid start, their widths, and the cubics of columns there."""
+        (start, end), both = self._grid[between[-1], [piece, piece + 1]], (piece, piece + 1)
+        width, columns = end - start, (self._values[which], self._slopes[which])
+        values, slopes = ([_blended(one, between, at) for at in both] for one in columns)
+        return start, width, values + [width * one for one in slopes]
+
     def _of_touched(self, closure: Array, between: Between) -> Array:
         """Return the fields of `LawPoint`, and the derivative of the pressure by the depth.
 
@@ -218,34 +223,26 @@ class RunningInLaws:
             between: Where depths lie between the levels.
         """
         level, _, rate, row = between
-        grid, last = self._grid[row], self._grid.shape[1] - 1
-        each, low = np.arange(len(closure)), np.zeros(len(closure), np.intp)
+        last, low = self._grid.shape[1] - 1, np.zeros(len(closure), np.intp)
         high = np.full(len(closure), last)
         for _ in range(last.bit_length() + 1):
             middle = (low + high) // 2
             below = _blended(self._values[0], between, middle) <= closure
             low, high = np.where(below, middle, low), np.where(below, high, middle)
         piece = np.minimum(low, last - 1)
-        start, width = grid[each, piece], grid[each, piece + 1] - grid[each, piece]
-        ends = [_blended(self._values, between, at) for at in (piece, piece + 1)]
-        tangents = [width * _blended(self._slopes, between, at) for at in (piece, piece + 1)]
-        t = _inverted(closure, *(one[0] for one in (*ends, *tangents)))
-        value, slope = _hermite(t, *ends, *tangents)
+        start, width, cubics = self._pieces(between, piece)
+        t = _inverted(closure, *(one[0] for one in cubics))
+        value, slope = _hermite(t, *cubics)
         slope = slope / width
         q = start + t * width
         touched = q > 0.0
         pressure = np.where(touched, q, 0.0) ** 1.5
         stiffness = 1.5 * np.sqrt(np.where(touched, q, 0.0)) / np.maximum(slope[0], 1e-300)
-        steps = [
-            _hermite(t, *(one[0, level + up, row, piece + right] * scale for one, right, scale in (
-                (self._values, 0, 1.0), (self._values, 1, 1.0),
-                (self._slopes, 0, width), (self._slopes, 1, width),
-            )))[0]
-            for up in (0, 1)
-        ]  # fmt: skip
+        levels = ((level, np.full_like(t, up), rate, row) for up in (0.0, 1.0))
+        steps = [_hermite(t, *self._pieces(one, piece, 0)[2])[0] for one in levels]
         by_depth = -rate * (steps[1] - steps[0]) * stiffness
         per_closure = np.where(touched, slope[2] / np.maximum(slope[0], 1e-300), -1.0)
-        gap = np.where(touched, value[2], ends[0][2] + ends[0][0] - closure)
+        gap = np.where(touched, value[2], cubics[0][2] + cubics[0][0] - closure)
         area, contacts = (np.where(touched, value[k], 0.0) for k in (1, 3))
         area = np.clip(area, 0.0, 1.0)  # tangents beyond the tables may leave it
         one = np.ones_like(closure)
@@ -320,8 +317,7 @@ class SlidLaws:
         place = float(np.interp(slid, distances, np.arange(len(distances))))
         below, share = int(place), place % 1.0
         if share and rate is not None:
-            two = (below, below + 1)
-            ends = [SlidLaws(levels[one : one + 1], distances[one], lean) for one in two]
+            ends = [SlidLaws([levels[one]], distances[one], lean) for one in (below, below + 1)]
             share = worn_share(share, float(np.diff(distances)[below]), ends, rate)
         parts = [(1.0 - share, *levels[below]), *((share, *one) for one in levels[below + 1 :])]
         self._parts, self.slid, self._lean = parts[: 1 + (share > 0.0)], slid, lean
@@ -402,12 +398,20 @@ Between = tuple[Indices, Array, Array, Indices]
 
 
 def _between(levels: Array, depth: Array, law: Indices) -> Between:
-    """Return where depths lie between levels, which rise or stay, shape (L, n) [mm]."""
+    """Return where depths lie between levels, which rise from 0, shape (L, n) or (L, 1) [mm].
+
+    Shares of the way are in logarithms, as levels double, but for the first.
+    """
     level = np.clip((levels <= depth).sum(axis=0) - 1, 0, len(levels) - 2)
     low, high = np.take_along_axis(levels, np.array([level, level + 1]), axis=0)
-    inside = depth < high
-    width = np.where(inside, high - low, 1.0)
-    return level, np.where(inside, (depth - low) / width, 1.0), inside / width, law
+    inside, first = depth < high, levels[1]
+    start, part, end = (
+        np.minimum(one / first - 1.0, np.log(np.maximum(one / first, 1.0)))
+        for one in (low, depth, high)
+    )
+    width = np.where(inside, end - start, 1.0)
+    share = np.where(inside, (part - start) / width, 1.0)
+    return level, share, inside / (width * np.maximum(first, depth)), law
 
 
 class _Curves(NamedTuple):
@@ -459,6 +463,7 @@ def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
         curves.append(scipy.interpolate.PchipInterpolator(q, rows_at, axis=1))
         ends.append(closure[-1])
     grid = reduce(np.union1d, [curve.x for curve in curves])
+    grid = grid[np.append(np.diff(grid) > ROUNDING * grid[1:], True)]  # tables end alike
     found = [_tabulated(curve, grid) for curve in curves]
     values, slopes = (np.stack(one, axis=1) for one in zip(*found, strict=True))
     return _Curves(grid, values, slopes, np.array(ends))

@@ -91,8 +91,7 @@ class About:
         if parts.decision is not None:
             said["choice"] = parts.decision.sentence
         if scene.by_laws:
-            condensed = self.coupling.condensed
-            said["newton"] = "condensed to the patches" if condensed else "on the mesh of the body"
+            said["newton"] = self.coupling.way_of_steps
         if scene.by_laws and (coefficients := scene.coefficients):
             said["friction"] = (
                 f"coefficient {describe.of_zones(parts, map(number, coefficients))}; the laws "
@@ -310,9 +309,9 @@ class Coupling(ABC):
     # --- laws
 
     @property
-    def condensed(self) -> bool:
-        """Whether load steps with laws know the bodies by the compliance of their patches alone."""
-        return False
+    def way_of_steps(self) -> str:
+        """How load steps with laws are found, in words."""
+        return "on the mesh of the body"
 
     @property
     def table_tolerance(self) -> float:

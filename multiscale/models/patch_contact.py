@@ -148,11 +148,6 @@ class PathContact(LawModel):
         plane: Any = {"approach": approach, "tilt": tilt, "centre": centre}
         return np.asarray(RigidPlane(**plane).means(patches))
 
-    def _laws_at(self, slid: float, approach: float | None) -> SlidLaws:
-        """Return the laws of the surface that has slid by a distance [mm], at a held approach."""
-        rate = None if approach is None else lambda one: self._rate(one.along(approach))
-        return SlidLaws(self._levels, slid, self._lean, rate)
-
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `Model.press`.
 
@@ -160,7 +155,8 @@ class PathContact(LawModel):
             NotConverged: Also when the laws were made for another macro model.
         """
         approach, evaluations = control.approach, 0
-        laws = self._laws_at(control.slid, approach)
+        rate = None if approach is None else lambda one: self._rate(one.along(approach))
+        laws = SlidLaws(self._levels, control.slid, self._lean, rate)
         path = laws.path
         if approach is None:
             approach, evaluations = path.approach_under(
@@ -217,9 +213,13 @@ class PathContact(LawModel):
         return np.array([pressure, worn]) if self.wears else pressure
 
     def transmissivities(self, step: LoadStep, cause: str | None, wider: float) -> Array:
-        """Return the transmissivities of the patches; see `LawModel.transmissivities`."""
-        laws = self._laws_at(step.slid_mm or 0.0, step.approach_mm)
-        return laws.transmissivities(step.approach_mm, step.patches.closure_mm, cause, wider)
+        """Return the transmissivities of the patches; see `LawModel.transmissivities`.
+
+        They are those of the latest load step.
+        """
+        assert self.past is not None, "load steps have been solved"
+        laws, approach, _ = self.past
+        return laws.transmissivities(approach, step.patches.closure_mm, cause, wider)
 
     def vibration_tangents(self, direction: Array | None) -> tuple[str, Array]:
         """Return where the contact is sampled, and its stiffnesses; see `FaceContact`."""

@@ -61,6 +61,19 @@ class PatchCoupling(CellCoupling):
         return self._pressed_evenly and (few or self.parts.interfering_patches <= self.table_rows)
 
     @property
+    def way_of_steps(self) -> str:
+        """How load steps are found, in words."""
+        if self._follows_rows:
+            return "along the rows of the laws"
+        return "condensed to the patches" if self.condensed else super().way_of_steps
+
+    @property
+    def _follows_rows(self) -> bool:
+        """Whether load steps lie on the rows of the laws: free planes, and what wears."""
+        free = self.parts.path.tilt is None and self._pressed_evenly
+        return not self.scene.patches_alone and (free or self.scene.wear is not None)
+
+    @property
     def _pressed_evenly(self) -> bool:
         """Whether nothing but mean pressures of patches deforms the bodies, without mass."""
         return not self.scene.needs_mesh and self.scene.coupling.interface == "patchwise"
@@ -276,15 +289,12 @@ class PatchCoupling(CellCoupling):
     # --- load steps
 
     def _make_model(self) -> Model:
-        """Make what finds load steps: on the mesh, or on the compliance of patches.
-
-        Free planes, and what wears, follow the rows of the laws.
-        """
+        """Make what finds load steps, see `way_of_steps`."""
         table, section, tilt = self.make_laws(), self.scene.wear, self.parts.path.tilt
         if section is not None and not table.worn:  # kept laws are those of new surfaces
             with self.clock.phase("laws"):
                 table = self.table = self._with_wear(table)
-        if table.path is not None and (section or (tilt is None and self._pressed_evenly)):
+        if self._follows_rows:
             moved, rubs = self.bodies.patch_displacements(self.table_rows), self.scene.friction
             wear, rubbed = (one.coefficient if one and section else 0.0 for one in (section, rubs))
             face = self.bodies.contact_face if self.scene.vibration else None

@@ -347,7 +347,7 @@ def test_a_face_that_yields_and_wears_is_as_its_sample(box):
         expected = flow.transmissivity * 4.0 / 6.0 * 0.4 / (12.0 * 1e-8)
         # hydraulic gaps and closures are linear between depths that double, and between rows
         assert step.leaks[0].rate == pytest.approx(expected, rel=0.1)
-        assert step.contact_area_fraction == pytest.approx(state.contact_area_fraction, rel=0.03)
+        assert step.contact_area_fraction == pytest.approx(state.contact_area_fraction, rel=0.04)
         # the box, free at two sides, is 2 mm high
         approach = state.approach + 10.0 / 4e3 * 2.0
         assert step.approach_mm == pytest.approx(approach, abs=5e-3 * state.mean_separation)

@@ -263,7 +263,7 @@ def test_laws_of_patches_wear_and_yield_as_their_cells():
     assert laws.approach_mm[-1] > 1.01 * elastic.approach_mm[-1]
 
 
-def test_laws_of_patches_leak_as_their_cells():
+def test_laws_of_patches_leak_as_their_cells(tmp_path):
     """One patch has all gaps between its walls, also as they wear; before as after."""
     leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"}
     spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_height": 1e-3, "seed": 5}
@@ -274,7 +274,12 @@ def test_laws_of_patches_leak_as_their_cells():
         "load": {"force": "2 N", "steps": 1, "sliding": [1.3e4]},
         "leak": leak,
     }
-    laws, cells = (run(of_patches(kind, **changes)) for kind in ("consistent", "concurrent"))
+    whole = ran_past(of_patches("consistent", **changes), 1, tmp_path / "checkpoint.state")
+    laws, cells = whole.history(), run(of_patches("concurrent", **changes))
     np.testing.assert_allclose(laws.leak_x_mm3_per_s, cells.leak_x_mm3_per_s, rtol=0.02)
     assert cells.leak_x_mm3_per_s[-1] < 0.8 * cells.leak_x_mm3_per_s[0]
     assert dict(laws.steps[-1].leaks[0].causes)["wear"] > 0.0
+    model = whole.coupling.model  # between two distances the surface leaks that presses
+    step = model.press(Control(force=2.0, slid=6e3))
+    through = model.past[0].transmissivities(step.approach_mm, step.patches.closure_mm)
+    np.testing.assert_allclose(model.transmissivities(step, None, 0.0), through, rtol=1e-12)

@@ -39,6 +39,24 @@ def test_a_plan_says_size_faces_and_body_term(mesh):
     assert any("linear elements lock" in warning for warning in setup.about.warnings())
 
 
+@pytest.mark.parametrize(
+    ("sections", "way"),
+    [
+        ({}, "condensed to the patches"),
+        ({"load": {"force": "2 N", "tilt": "free"}}, "along the rows of the laws"),
+        (
+            {"load": {"force": "2 N", "sliding": ["1 m"]}, "wear": {"coefficient": 1e-8}},
+            "along the rows of the laws",
+        ),
+        ({"coupling": {"kind": "consistent", "interface": "pointwise"}}, "on the mesh of the body"),
+    ],
+    ids=["patches", "free", "wear", "points"],
+)
+def test_a_plan_says_how_load_steps_are_found(mesh, sections, way):
+    setup = setup_of(mesh, **{"coupling": {"kind": "consistent"}, **sections})
+    assert dict(setup.about.statements())["newton"] == way
+
+
 def test_a_plan_says_what_samples_there_are(mesh):
     setup = setup_of(mesh, **SAMPLES)
     said = dict(setup.about.statements())
