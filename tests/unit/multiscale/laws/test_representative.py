@@ -14,8 +14,9 @@ from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale import LawTable, read_laws, representative_law, representative_laws
 from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.laws.law_table import law_bytes
+from patchlaw.multiscale.laws.of_samples import PeriodicSample
 
-MODULUS = 4000.0
+MODULUS = YOUNG = 4000.0
 
 
 def sample(seed, slope=0.1):
@@ -133,11 +134,27 @@ def test_closure_ends_the_law(limits, end):
     assert law.range[1] == pytest.approx(end, rel=1e-12)
 
 
+def flattening(model):
+    """Return the mean pressure that just flattens small slopes, from a larger one [MPa]."""
+    pressures = replace(model, slopes=()).press(Control(force=3000.0)).pressure
+    assert pressures.min() > 0.0
+    return pressures.mean() - pressures.min()
+
+
+def with_slopes(surface):
+    material = Material(young_modulus=YOUNG, poisson_ratio=0.3)
+    slopes = FiniteSlopes(surface, material, periodic=True)
+    modulus = YOUNG / (1.0 - 0.3**2)
+    return HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, slopes=(slopes,))
+
+
+def steep(seed):
+    spectrum = Spectrum(hurst=0.8, waves=(1, 4), rms_slope=0.2, seed=seed)
+    return replace(synthesise(spectrum, grid=(24, 24), lengths=(1.0, 1.0)), periodic=True)
+
+
 def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
-    model = HalfSpaceModel(SAMPLES[0], contact_modulus=MODULUS, periodic=True)
-    flat = model.press(Control(force=3000.0)).pressure  # in full contact
-    full = flat.mean() - flat.min()
-    assert flat.min() > 0.0
+    full = flattening(HalfSpaceModel(SAMPLES[0], contact_modulus=MODULUS, periodic=True))
     law = representative_law(SAMPLES[:1], MODULUS, largest_pressure=2.0 * full)
     assert law.is_function
     assert law.rows.pressure[-1] == pytest.approx(2.0 * full, rel=1e-9)
@@ -150,6 +167,9 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     # closed, whatever the closure says; between the rows two interpolants differ
     assert np.abs(beyond.separation).max() < 1e-3 * closed
     assert law.range[1] - closed == pytest.approx(0.01 * (closed - law.first_touch), rel=1e-6)
+    # the half-space of the roughness goes on, too: one compliance for all rows
+    layer = law.rows.approach - law.rows.closure
+    assert layer == pytest.approx(layer[row] / full * law.rows.pressure, rel=1e-9)
     # and so do the tangents beyond the last row
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
 
@@ -168,27 +188,27 @@ def test_a_law_ends_anywhere_about_full_contact(beyond):
         assert law.rows.pressure[-1] == pytest.approx(pressure, rel=1e-9)  # of its end, `_CLOSE`
 
 
+def test_with_finite_slopes_a_law_ends_at_a_hundredth_of_its_mean_compliance():
+    sample = PeriodicSample(with_slopes(steep(0)))
+    end = sample.closed.row[0]
+    below, here, above = (
+        sample.model.press(Control(force=factor * end)).approach for factor in (0.98, 1.0, 1.02)
+    )
+    full = 0.01 * sample.first_touch / flattening(sample.model)
+    assert (above - here) / (0.02 * end) < full < (here - below) / (0.02 * end)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
     """There is a force at each approach; the last one is less than that of full contact."""
-    young, nu = 4000.0, 0.3
-    modulus, given = young / (1.0 - nu**2), []
-    for seed in range(count):
-        spectrum = Spectrum(hurst=0.8, waves=(1, 4), rms_slope=0.2, seed=seed)
-        sample = synthesise(spectrum, grid=(24, 24), lengths=(1.0, 1.0))
-        given.append(replace(sample, periodic=True))
-
-    def model_of(surface):
-        material = Material(young_modulus=young, poisson_ratio=nu)
-        slopes = FiniteSlopes(surface, material, periodic=True)
-        return HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, slopes=(slopes,))
-
-    law = representative_law(given, modulus, largest_pressure=0.8 * young, make_model=model_of)
+    given = [steep(seed) for seed in range(count)]
+    modulus = YOUNG / (1.0 - 0.3**2)
+    law = representative_law(given, modulus, largest_pressure=0.8 * YOUNG, make_model=with_slopes)
     rows, closed = law.rows, law.initial_separation
     assert law.is_function and (rows.contact_area_fraction[-4:] == 1.0).all()
     last = len(rows) - 5
-    models = [model_of(surface) for surface in given]
+    models = [with_slopes(surface) for surface in given]
     for row in (last // 2, last - 2, last - 1):
         lower = closed - np.array(
             [one.reference_height - one.surface.mean_height for one in models]
@@ -217,10 +237,10 @@ def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
         # the compliance has fallen to a hundredth or less: the rest is less than 2 % of that
         assert max(approaches) - approaches[1] < 3e-3 * 0.15 * closed
     longer = representative_law(
-        given, modulus, largest_pressure=1.6 * young, make_model=model_of, before=law
+        given, modulus, largest_pressure=1.6 * YOUNG, make_model=with_slopes, before=law
     )
     assert longer.rows.pressure[: last + 1] == pytest.approx(rows.pressure[: last + 1], rel=1e-12)
-    assert longer.rows.pressure[-1] == pytest.approx(1.6 * young, rel=1e-9)
+    assert longer.rows.pressure[-1] == pytest.approx(1.6 * YOUNG, rel=1e-9)
 
 
 def test_a_law_that_ends_before_first_touch_is_open():
