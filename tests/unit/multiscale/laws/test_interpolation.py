@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent, _pchip_slopes
+from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent, _pchip_slopes
+from patchlaw.multiscale.laws.rows import LawRows
 
 RNG = np.random.default_rng(2)
 COMPLIANCE = 1e-5 * (np.eye(12) + 0.05 * RNG.uniform(0.0, 1.0, (12, 12)))
@@ -57,3 +58,22 @@ def test_closures_that_stop_little_by_little_have_no_rigid_end():
     found = _pchip_slopes(np.arange(4.0), secant, np.array([0]), np.array([3]))[-1]
     exact = np.log(4.0) * 0.25**3
     assert (0.5 * exact < found).all() and (found < exact).all()
+
+
+def test_mean_gaps_of_rounding_are_none():
+    """Whatever is left at the last row, the law is as stiff against its gap before."""
+    approach = np.linspace(1e-3, 5e-3, 9)
+    gap = 1e-3 * (1.0 - np.linspace(0.0, 1.0, 9)) ** 2
+    stiffness = []
+    for left in (-1e-12, 0.0, 1e-11):
+        gap[-1] = left
+        rows = LawRows(
+            approach=approach, closure=2e-3 - gap, pressure=np.linspace(0.0, 40.0, 9),
+            contact_area_fraction=np.linspace(0.0, 1.0, 9), contacts=np.ones(9, int),
+            unresolved_displacement=np.zeros(9),
+        )  # fmt: skip
+        curves = LawCurves.through(rows, [9], [2e-3])
+        point = curves.at(0, approach[-2] + np.array([1e-5, 2e-4]))
+        stiffness.append(curves.interface_stiffness(0, point))
+    np.testing.assert_allclose(stiffness, np.broadcast_to(stiffness[0], (3, 2)), rtol=1e-5)
+    assert (stiffness[0] > 0.0).all()
