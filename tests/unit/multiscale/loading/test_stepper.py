@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers.histories import load_step
 
-from patchlaw.multiscale import LoadHistory, LoadStep, Problem, Step
-from patchlaw.multiscale.loading.load_step import PatchState
+from patchlaw.multiscale import LoadHistory, Problem, Step
 from patchlaw.multiscale.loading.path import Stage
 from patchlaw.multiscale.models.problem import BeyondLaws
 from patchlaw.support import InputError, NotConverged
@@ -28,13 +28,8 @@ class Spring:
         if abs(approach - self.last) > self.largest_step:
             raise NotConverged("it", reason="DIVERGED", iterations=2, remedy="take smaller steps")
         self.last = approach
-        one = np.ones(1)
-        return LoadStep(
-            step=0, approach_mm=approach, force_N=approach**1.5, mean_pressure_MPa=0.0,
-            contact_area_fraction=0.0, mean_separation_mm=0.0, contacts=0, newton_iterations=3,
-            linear_iterations=10, wall_s=0.0, reason="CONVERGED",
-            patches=PatchState(closure_mm=one, pressure_MPa=one, contact_area_fraction=one),
-        )  # fmt: skip
+        spent = {"newton_iterations": 3, "linear_iterations": 10}
+        return load_step(0, approach_mm=approach, force_N=approach**1.5, **spent)
 
 
 def test_a_load_that_a_solver_refuses_is_wrong_input_before_the_first_step_alone():

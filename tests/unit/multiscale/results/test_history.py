@@ -7,10 +7,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from helpers.histories import history_of, load_step
 
 from patchlaw import Scene, run
 from patchlaw.geometry import PatchGrid, Regions
-from patchlaw.multiscale import History, LoadStep
+from patchlaw.multiscale import History
 from patchlaw.multiscale.loading.load_step import COLUMNS, PatchState
 from patchlaw.support import InputError
 
@@ -22,18 +23,13 @@ FIRST_COLUMNS = (
 
 @pytest.fixture
 def history():
-    ones = np.ones(1)
-    state = PatchState(closure_mm=ones, pressure_MPa=ones, contact_area_fraction=ones)
-    steps = [
-        LoadStep(
-            step=number, approach_mm=4e-3 * number, force_N=0.5 * number, mean_pressure_MPa=0.5,
-            contact_area_fraction=0.01, mean_separation_mm=0.02, contacts=3, newton_iterations=4,
-            linear_iterations=5, wall_s=0.25, reason="<CONVERGED>", patches=state,
+    return history_of(
+        load_step(
+            number, approach_mm=4e-3 * number, force_N=0.5 * number, reason="<CONVERGED>",
             tilt=(1e-3, 2e-3), moment_N_mm=(0.1, 0.2), force_error_N=error,
         )
         for number, error in ((1, None), (2, 0.03))
-    ]  # fmt: skip
-    return History(steps=tuple(steps), patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    )  # fmt: skip
 
 
 def test_columns_of_the_file_stay_in_their_order():
@@ -147,7 +143,7 @@ def test_data_frame_without_pandas_says_what_to_install(history, monkeypatch):
 
 
 def test_a_column_of_before_says_what_it_is_called_now():
-    history = History(steps=(), patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    history = history_of(())
     with pytest.raises(AttributeError, match="called 'approach_stiffness_N_per_mm', and contains"):
         _ = history.stiffness_N_per_mm
     with pytest.raises(AttributeError, match=r"no attribute 'stifness'$"):

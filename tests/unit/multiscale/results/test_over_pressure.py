@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.histories import history_of, load_step
 
-from patchlaw.geometry import PatchGrid
-from patchlaw.multiscale import History, LoadStep, Scene, run
-from patchlaw.multiscale.loading.load_step import PatchState
+from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.results.figures.curves import over_pressure_figure
 from patchlaw.multiscale.results.run_curves import over_pressure, pressure_between
 
-ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
 AREA = 2.7
 
 
@@ -20,14 +18,13 @@ def history(pressure, **columns):
     columns = {"approach_mm": np.sqrt(pressure) * 1e-4, "mean_separation_mm": 1e-3} | columns
     columns = {name: np.broadcast_to(one, len(pressure)) for name, one in columns.items()}
     steps = [
-        LoadStep(
-            step=k + 1, force_N=AREA * p, mean_pressure_MPa=p, contacts=1, newton_iterations=1,
-            contact_area_fraction=1e-3 * p**0.93, patches=ONES,
+        load_step(
+            k + 1, force_N=AREA * p, mean_pressure_MPa=p, contact_area_fraction=1e-3 * p**0.93,
             **{name: None if np.isnan(one[k]) else float(one[k]) for name, one in columns.items()},
         )
         for k, p in enumerate(pressure)
     ]  # fmt: skip
-    return History(steps=tuple(steps), patches=PatchGrid(grid=(1, 1), lengths=(AREA, 1.0)))
+    return history_of(steps, AREA)
 
 
 def test_exponents_of_powers_are_exact():

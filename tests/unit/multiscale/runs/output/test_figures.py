@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.histories import history_of, load_step
 from matplotlib.figure import Figure
 
 from patchlaw.geometry import Asperities, PatchGrid, Spectrum, find_asperities, synthesise
-from patchlaw.multiscale import History, LoadStep
-from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.results.figures.contact import contact_figure, contact_maps
 from patchlaw.multiscale.results.figures.curves import history_figure, wear_figure
@@ -180,18 +179,15 @@ def test_several_contacts_share_their_colours():
 def loaded(loads, stiffness):
     """Return a history of pairs of force [N] and approach [mm] on 1 mm²; None as stiffness leaves
     curves between load steps unknown."""
-    ones = np.ones(1)
-    state = PatchState(closure_mm=ones, pressure_MPa=ones, contact_area_fraction=ones)
-    steps = tuple(
-        LoadStep(
-            step=number, approach_mm=approach, force_N=force, mean_pressure_MPa=force,
-            contact_area_fraction=0.01 * force, mean_separation_mm=0.01 - approach, contacts=1,
-            newton_iterations=1, patches=state, approach_stiffness_N_per_mm=stiffness,
-            force_error_N=0.0, approach_error_mm=1e-4 * number,
+    return history_of(
+        load_step(
+            number, approach_mm=approach, force_N=force, mean_pressure_MPa=force,
+            contact_area_fraction=0.01 * force, mean_separation_mm=0.01 - approach,
+            approach_stiffness_N_per_mm=stiffness, force_error_N=0.0,
+            approach_error_mm=1e-4 * number,
         )
         for number, (force, approach) in enumerate(loads, 1)
     )  # fmt: skip
-    return History(steps=steps, patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
 
 
 CYCLE = [(1.0, 1e-3), (2.0, 2e-3), (1.0, 1.5e-3), (0.0, 1e-3), (3.0, 3e-3)]

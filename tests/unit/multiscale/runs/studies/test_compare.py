@@ -239,16 +239,3 @@ def test_command_refuses_before_anything_is_run(capsys, tmp_path, monkeypatch, w
     assert main([str(PAPER) if word == "SCENE" else word for word in words]) == 2
     assert text in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-
-
-def test_history_gives_records():
-    scene = Scene.load(PAPER, [*TINY, "coupling.kind=analytic", "micro.model=elliptic"])
-    history = run(scene)
-    records, patches = history.records(), history.patch_records()
-    assert [record["force_N"] for record in records] == list(history.force_N)
-    assert [record["pressure_MPa"] for record in patches] == list(
-        history.patch_pressure_MPa.ravel()
-    )
-    assert set(patches[0]) == {
-        "step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction",
-    }  # fmt: skip

@@ -8,33 +8,30 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from helpers.histories import ONES, history_of, load_step
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.geometry import PatchGrid, Regions
-from patchlaw.multiscale import History, LoadStep, Scene, difference, run
+from patchlaw.geometry import Regions
+from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.column import Leak
-from patchlaw.multiscale.loading.load_step import PatchState
 from patchlaw.multiscale.results.figures.studies import difference_over_pressure_figure
 from patchlaw.multiscale.results.run_curves import interpolated
 from patchlaw.support import InputError
-
-ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
 
 
 def history(pressure, approach, *, area=2.0, **columns):
     """Return a history of given pressures and approaches, on a face of an area in mm²."""
     steps = [
-        LoadStep(
-            step=number, approach_mm=a, force_N=p * area, mean_pressure_MPa=p,
-            contact_area_fraction=1e-3 * p, mean_separation_mm=0.05 - a, contacts=1,
-            newton_iterations=1, patches=ONES,
+        load_step(
+            number, approach_mm=a, force_N=p * area, mean_pressure_MPa=p,
+            contact_area_fraction=1e-3 * p, mean_separation_mm=0.05 - a,
         )
         for number, (p, a) in enumerate(zip(pressure, approach, strict=True), 1)
     ]  # fmt: skip
     for name, values in columns.items():
         steps = [replace(one, **{name: value}) for one, value in zip(steps, values, strict=True)]
-    return History(steps=tuple(steps), patches=PatchGrid(grid=(1, 1), lengths=(area, 1.0)))
+    return history_of(steps, area)
 
 
 def power(stiffness, exponent, loads, **other):
