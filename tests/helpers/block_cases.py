@@ -7,7 +7,14 @@ from mpi4py import MPI
 
 from helpers.contact_laws import PowerLaw
 from patchlaw.geometry import BlockShape, PatchGrid
-from patchlaw.macro import Block, LoadedFace, Material, block_mesh
+from patchlaw.macro import (
+    Block,
+    LoadedFace,
+    Material,
+    UnilateralContactProblem,
+    block_mesh,
+    rough_block_mesh,
+)
 
 
 def uneven_laws(count, k=3e4):
@@ -28,3 +35,10 @@ def block_of(sides="free", young_modulus=4000.0, poisson_ratio=0.15, comm=MPI.CO
 def interface_of(block, grid):
     """Put patches over the whole interface of a block."""
     return LoadedFace.of_block(block, PatchGrid(grid=grid, lengths=block.mesh.shape.interface))
+
+
+def rough_contact(shape, surface, material, sides="free", **options):
+    """Put a rough surface on top of a block of one process, as a problem of its contact."""
+    mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
+    highest = surface.highest - surface.mean_height
+    return UnilateralContactProblem(Block(mesh, material, sides), highest, **options)

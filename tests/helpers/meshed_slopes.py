@@ -1,9 +1,7 @@
 """Forces on a meshed block with a rough face, whose slopes are finite or nearly none."""
 
-from mpi4py import MPI
-
+from helpers.block_cases import rough_contact
 from patchlaw.geometry import Control, RefinedShape, places_in_reach
-from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 
 LOW = 0.01
 """Share of the heights at which slopes change the force no more."""
@@ -34,9 +32,6 @@ def forces_with_slopes_and_without(surface, material, *, height, approach, fine,
     forces = []
     for scale in (1.0, LOW):
         scaled = surface.scaled(scale)
-        mesh, _ = rough_block_mesh(shape, scaled, MPI.COMM_SELF)
-        block = UnilateralContactProblem(
-            Block(mesh, material, sides=sides), scaled.highest - scaled.mean_height
-        )
+        block = rough_contact(shape, scaled, material, sides)
         forces.append(block.solve(Control(approach=approach * scale)).force / scale)
     return forces

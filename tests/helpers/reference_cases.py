@@ -6,8 +6,9 @@ import numpy as np
 from mpi4py import MPI
 from scipy.special import gamma
 
+from helpers.block_cases import rough_contact
 from patchlaw.geometry import BlockShape, Control, Surface, reference_shapes
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, HalfSpaceModel, HertzContact
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
@@ -110,10 +111,7 @@ def meshed(surface, approach, *, method="active-set", patches=None, **options):
     options = {"count": 1} | options
     blocks = []
     for shape in reference_shapes(surface, approach, 1.0, **options):
-        mesh, _ = rough_block_mesh(shape, surface, COMM)
-        highest = surface.highest - surface.mean_height
-        block = Block(mesh, MATERIAL)
-        blocks.append(UnilateralContactProblem(block, highest, method=method, patches=patches))
+        blocks.append(rough_contact(shape, surface, MATERIAL, method=method, patches=patches))
     return blocks
 
 

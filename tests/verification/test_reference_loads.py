@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers.reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
+from helpers.block_cases import rough_contact
+from helpers.reference_cases import MATERIAL, MODULUS, body, give, on_block, pressed
 
 from patchlaw.geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
-from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import HertzContact
 
 RADIUS, SIZE, APART = 100.0, 0.06, 0.16
@@ -68,11 +68,8 @@ TETRAHEDRA = RefinedShape(
 @pytest.mark.parametrize("shape", [CUBES, TETRAHEDRA], ids=["Q1", "P2"])
 def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
     """All of it in contact from the first touch: confined compression, exact on every mesh."""
-    mesh, _ = rough_block_mesh(shape, FLAT, COMM)
     patches = PatchGrid(grid=(4, 2), lengths=(1.0, 1.0))
-    block = UnilateralContactProblem(
-        Block(mesh, MATERIAL, sides="roller"), 0.0, method=method, patches=patches
-    )
+    block = rough_contact(shape, FLAT, MATERIAL, "roller", method=method, patches=patches)
     state = block.solve(Control(approach=1e-3))
     first, shear = MATERIAL.lame
     force = (first + 2.0 * shear) * 1e-3 / 0.5
@@ -90,10 +87,7 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
 
 def test_a_flat_top_holds_a_free_plane_level():
     """By symmetry; its sides bulge, and the corners press hardest."""
-    mesh, _ = rough_block_mesh(CUBES, FLAT, COMM)
-    state = UnilateralContactProblem(Block(mesh, MATERIAL), 0.0).solve(
-        Control(force=2.0, tilt=None)
-    )
+    state = rough_contact(CUBES, FLAT, MATERIAL).solve(Control(force=2.0, tilt=None))
     assert state.force == pytest.approx(2.0, rel=1e-9)
     assert np.abs(state.moment).max() < 2e-9  # of force times half a side
     assert np.abs(state.tilt).max() < 1e-9 * state.approach

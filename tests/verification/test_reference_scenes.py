@@ -5,10 +5,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.reference_cases import COMM, ellipsoid
+from helpers.block_cases import rough_contact
+from helpers.reference_cases import ellipsoid
 
 from patchlaw.geometry import BlockShape, Control, Spectrum, reference_shapes, synthesise
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Material
 
 SET_1 = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
 SET_2 = Spectrum(hurst=0.95, waves_x=(2, 7), waves_y=(2, 12), rms_slope=0.215, seed=2)
@@ -45,11 +46,8 @@ def curve(case, shape, method="active-set", shares=(0.5, 1.0)):
     """Return the block, its surface, and its contact at shares of the approach."""
     surface, options = case.surface, {"fine": case.fine, "tilt": case.tilt}
     (refined,) = reference_shapes(surface, case.approach, 1.0, count=1, **options)
-    mesh, _ = rough_block_mesh(shape or refined, surface, COMM)
     material = Material(young_modulus=4000.0, poisson_ratio=case.poisson_ratio)
-    block = UnilateralContactProblem(
-        Block(mesh, material), surface.highest - surface.mean_height, method=method
-    )
+    block = rough_contact(shape or refined, surface, material, method=method)
     controls = (Control(approach=share * case.approach, tilt=case.tilt) for share in shares)
     return block, surface, [block.solve(control) for control in controls]
 
@@ -122,8 +120,7 @@ def force_on_a_sphere(poisson_ratio, element, size):
     )
     options = {"fine": size * contact, "element": element}
     (shape,) = reference_shapes(surface, approach, 1.0, count=1, **options)
-    mesh, _ = rough_block_mesh(shape, surface, COMM)
-    block = UnilateralContactProblem(Block(mesh, material), surface.highest - surface.mean_height)
+    block = rough_contact(shape, surface, material)
     hertz = 4.0 / 3.0 * material.contact_modulus * np.sqrt(radius) * approach**1.5
     state = block.solve(Control(approach=approach))
     return state.force / hertz

@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from helpers.reference_cases import COMM, MATERIAL, on_block
+from helpers.block_cases import rough_contact
+from helpers.reference_cases import MATERIAL, on_block
 
 from patchlaw.geometry import Control, Spectrum, reference_shapes, suggested_fine, synthesise
-from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 from patchlaw.multiscale import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
@@ -30,8 +30,7 @@ def forces(seed, scale, edges):
     shapes = reference_shapes(rough(seed), APPROACH, 1.0, count=2, fine=fine)
     top, found = rough(seed).scaled(scale), []
     for shape in shapes:
-        mesh, _ = rough_block_mesh(shape, top, COMM)
-        block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
+        block = rough_contact(shape, top, MATERIAL)
         found.append(block.solve(Control(approach=APPROACH * scale)).force / scale)
     return np.array(found), [shape.fine for shape in shapes]
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from helpers.block_cases import rough_contact
 from helpers.boussinesq import displacements
 from helpers.free_side_points import side_displacements
 from helpers.love_stresses import love_stresses
@@ -16,14 +17,7 @@ from helpers.reference_cases import COMM, MATERIAL, MODULUS, on_block
 from scipy.interpolate import RectBivariateSpline
 
 from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface, reference_shapes
-from patchlaw.macro import (
-    Block,
-    LoadedFace,
-    Material,
-    UnilateralContactProblem,
-    block_mesh,
-    rough_block_mesh,
-)
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh
 from patchlaw.micro import FreeSides, SideStresses
 from patchlaw.multiscale import extrapolated
 
@@ -178,8 +172,7 @@ def meshed_force():
     shapes = reference_shapes(ball, APPROACH, 1.0, count=2, fine=0.0095)
     top = ball.scaled(FLAT)
     for shape in shapes:
-        block = Block(rough_block_mesh(shape, top, COMM)[0], MATERIAL)
-        problem = UnilateralContactProblem(block, top.highest - top.mean_height)
+        problem = rough_contact(shape, top, MATERIAL)
         forces.append(problem.solve(Control(approach=APPROACH * FLAT)).force / FLAT)
     found = extrapolated(np.array(forces)[:, None], [s.fine for s in shapes], 4.0)
     return float(found.value[0]), float(found.error[0])

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from mpi4py import MPI
+from helpers.block_cases import rough_contact
 from scipy.sparse.linalg import splu
 
 from patchlaw.geometry import Control, RefinedShape, Surface, places_in_reach, roughness
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Material
 from patchlaw.multiscale import Scene, make_setup, run
 
 _FAR, _DEPTH = 15.0, 0.5  # radius and depth of the cylinder, decay of the warp [mm]
@@ -193,10 +193,7 @@ def test_the_stated_error_holds_the_slopes_of_a_meshed_surface(seed, gradient):
     )
     forces = []
     for scale in (1.0, 0.01):
-        top = rough.scaled(scale)
-        mesh, _ = rough_block_mesh(shape, top, MPI.COMM_SELF)
-        body = Block(mesh, Material(**block))
-        problem = UnilateralContactProblem(body, top.highest - top.mean_height)
+        problem = rough_contact(shape, rough.scaled(scale), Material(**block))
         forces.append(problem.solve(Control(approach=approach * scale)).force / scale)
     effect = forces[0] / forces[1]
     assert effect < 0.99

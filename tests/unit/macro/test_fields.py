@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from helpers.block_cases import rough_contact
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
@@ -12,10 +13,8 @@ from patchlaw.macro import (
     FieldStep,
     LoadedFace,
     Material,
-    UnilateralContactProblem,
     block_mesh,
     compat,
-    rough_block_mesh,
     write_fields,
     write_rough_fields,
 )
@@ -39,8 +38,7 @@ def test_a_confined_block_has_one_pressure(element, tmp_path):
         if element.endswith("*")  # curved cells
         else BlockShape(**CUBE, cells=(3, 2, 2), element=element)
     )
-    mesh, _ = rough_block_mesh(shape, flat, MPI.COMM_SELF)
-    rough = UnilateralContactProblem(Block(mesh, MATERIAL, sides="roller"), 0.0)
+    rough = rough_contact(shape, flat, MATERIAL, "roller")
     state = rough.solve(Control(approach=5e-3))
     write_rough_fields(tmp_path / "fields.xdmf", rough, [(0, state)])
     with h5py.File(tmp_path / "fields.h5") as file:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mpi4py import MPI
+from helpers.block_cases import rough_contact
 
 from patchlaw.geometry import BlockShape, Control, Spectrum, Surface, synthesise
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Material
 from patchlaw.macro.contact.augmented_lagrangian import INTERFERENCE
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
@@ -21,11 +21,7 @@ SHAPE = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(8, 8, 3), grading=2.
 
 
 def problem(shape, method, surface=SPHERE, sides="free", **options):
-    mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
-    block = Block(mesh, MATERIAL, sides)
-    return UnilateralContactProblem(
-        block, surface.highest - surface.mean_height, method=method, **options
-    )
+    return rough_contact(shape, surface, MATERIAL, sides, method=method, **options)
 
 
 def at_points(found, state):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.block_cases import rough_contact
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -10,12 +11,10 @@ from patchlaw.macro import (
     Block,
     LoadedFace,
     Material,
-    UnilateralContactProblem,
     block_mesh,
     compat,
     displacements_under,
     face_compliance,
-    rough_block_mesh,
 )
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -45,10 +44,7 @@ def kept(capfd):
 def rough_block(method):
     spectrum = Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.1, seed=2)
     surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
-    mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
-    return UnilateralContactProblem(
-        Block(mesh, MATERIAL), surface.highest - surface.mean_height, method=method
-    )
+    return rough_contact(SHAPE, surface, MATERIAL, method=method)
 
 
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])

@@ -4,21 +4,18 @@ from functools import partial
 
 import numpy as np
 import pytest
+from helpers.block_cases import block_of, interface_of
 from helpers.body_meshes import SIDE, box, standing
 from helpers.contact_laws import PowerLaw
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry import BlockShape, Control, PatchGrid
+from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import (
-    Block,
     FieldStep,
     LawContactProblem,
-    LoadedFace,
     Loads,
     Material,
     Traction,
-    block_mesh,
     compat,
     write_fields,
 )
@@ -37,11 +34,7 @@ class Broken(PowerLaw):
 
 @pytest.fixture
 def interface():
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 2), element="Q2")
-    block = Block(
-        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
-    )
-    return LoadedFace.of_block(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
+    return interface_of(block_of(cells=(4, 4, 2), element="Q2"), (2, 2))
 
 
 def test_open_interface_is_solved_at_once(interface):
@@ -145,11 +138,7 @@ def test_the_users_tolerances_win(interface):
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])
 def test_fields_are_written_for_paraview(element, tmp_path):
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
-    block = Block(
-        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
-    )
-    interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    interface = interface_of(block_of(cells=(2, 2, 2), element=element), (2, 1))
     state = LawContactProblem(interface, [Spring(), Spring(k=5e3)]).solve(Control(approach=1e-3))
     step = FieldStep(0, state.displacement, state.patch_pressure)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
@@ -174,13 +163,9 @@ def test_fields_are_written_for_paraview(element, tmp_path):
 def test_fields_share_cells_that_borders_cut(element, tmp_path):
     """Patches of a third on cells of a quarter: the cells' pressures carry the whole force."""
     h5py = pytest.importorskip("h5py")
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 2), element=element)
-    block = Block(
-        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
-    )
-    interface = LoadedFace.of_block(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
+    interface = interface_of(block_of(cells=(4, 4, 2), element=element), (3, 1))
     given = np.array([3.0, 5.0, 8.0])
-    step = FieldStep(0, np.zeros(block.owned_dofs), given)
+    step = FieldStep(0, np.zeros(interface.body.owned_dofs), given)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()

@@ -190,49 +190,10 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("damage", "text"),
-    [
-        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its bytes do not fit their"),
-        (lambda path: path.write_bytes(b"nothing of the kind\n"), "its bytes do not fit their"),
-        (lambda path: write_record(path, ["a list"]), "is no checkpoint"),
-        (lambda path: write_record(path, asdict(read_checkpoint(path))), "is no checkpoint"),
-        (lambda path: flip(path), "its bytes do not fit their"),
-        (lambda path: in_another_layout(path), "was written by another patchlaw"),
-        (lambda path: write_record(path, Gone()), "was written by another patchlaw"),
-        (lambda path: with_other_states(path), "was written by another patchlaw"),
-    ],
-    ids=[
-        "cut",
-        "foreign",
-        "no checkpoint",
-        "its content alone",
-        "a bit flipped",
-        "another layout",
-        "another class",
-        "other states",
-    ],
-)
-def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
-    path = interrupted(tmp_path / "out", ended)
-    damage(path)
-    before = {each.name: each.read_bytes() for each in path.parent.iterdir()}
-    with pytest.raises(InputError, match=text) as error:
-        resumed(path.parent, ended.scene)
-    assert str(path) in str(error.value)
-    assert "remove it, or begin anew with --overwrite" in str(error.value)
-    assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == before
-
-
 def flip(path):
     content = bytearray(path.read_bytes())
     content[-3] ^= 1
     path.write_bytes(content)
-
-
-def with_other_states(path):
-    """Replace a checkpoint by one whose states of models are of another layout."""
-    write_record(path, replace(read_checkpoint(path), layout=1))
 
 
 @dataclass
@@ -246,6 +207,34 @@ def in_another_layout(path):
     """Replace a checkpoint by one of the layout of 0.9: facts, and the shapes of arrays."""
     line = b'[{"format": "patchlaw checkpoint 8"}, {}]\n'
     path.write_bytes(f"{sha256(line).hexdigest()} {len(line)}\n".encode() + line)
+
+
+UNFIT, NONE, OTHER = "its bytes do not fit their", "is no checkpoint", "written by another patchlaw"
+DAMAGE = {
+    "cut": (lambda path: path.write_bytes(path.read_bytes()[:3000]), UNFIT),
+    "foreign": (lambda path: path.write_bytes(b"nothing of the kind\n"), UNFIT),
+    "no checkpoint": (lambda path: write_record(path, ["a list"]), NONE),
+    "its content alone": (lambda path: write_record(path, asdict(read_checkpoint(path))), NONE),
+    "a bit flipped": (flip, UNFIT),
+    "another layout": (in_another_layout, OTHER),
+    "another class": (lambda path: write_record(path, Gone()), OTHER),
+    "states of another layout": (
+        lambda path: write_record(path, replace(read_checkpoint(path), layout=1)), OTHER
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, name):
+    path = interrupted(tmp_path / "out", ended)
+    damage, text = DAMAGE[name]
+    damage(path)
+    before = {each.name: each.read_bytes() for each in path.parent.iterdir()}
+    with pytest.raises(InputError, match=text) as error:
+        resumed(path.parent, ended.scene)
+    assert str(path) in str(error.value)
+    assert "remove it, or begin anew with --overwrite" in str(error.value)
+    assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == before
 
 
 def test_an_interrupted_run_goes_on_unless_it_is_to_begin_anew(tmp_path, ended, capsys):

@@ -18,17 +18,6 @@ from patchlaw.support import InputError
 PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 
 
-def test_two_runs_do_not_share_a_folder(tmp_path):
-    one, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
-    one.hold()
-    with pytest.raises(InputError, match=r"--out = '.*out': another run is writing to this folder"):
-        other.hold()
-    one.release()
-    other.hold()
-    other.release()
-    assert not (tmp_path / "out").exists()  # neither wrote anything
-
-
 VARY = ("--vary", "surface.spectrum.seed=0..3")
 WRITING = (("laws",), ("surface",), ("run",), ("compare",), ("sweep", *VARY))
 
@@ -85,17 +74,21 @@ def network(monkeypatch):
     monkeypatch.setattr(fcntl, "flock", of_files)
 
 
-@pytest.mark.usefixtures("network")
-def test_a_file_is_locked_where_folders_cannot_be(tmp_path):
+@pytest.mark.parametrize("locked", ["folder", "file"])
+def test_two_runs_do_not_share_a_folder(tmp_path, locked, request):
+    """A file is locked where folders cannot be."""
+    if locked == "file":
+        request.getfixturevalue("network")
     one, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
     one.hold()
-    assert [path.name for path in (tmp_path / "out").iterdir()] == [".lock"]
-    with pytest.raises(InputError, match="another run is writing to this folder"):
+    there = [".lock"] * (locked == "file")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == there
+    with pytest.raises(InputError, match=r"--out = '.*out': another run is writing to this folder"):
         other.hold()
     one.release()
     other.hold()
     other.release()
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out").exists()  # neither wrote anything
 
 
 @pytest.mark.usefixtures("network")
