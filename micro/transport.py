@@ -262,7 +262,7 @@ def gap_flows(
         raise InputError("is no map of gaps", value=gap.shape, allowed="cells along x and y")
     if not (np.isfinite(gap).all() and (gap >= 0.0).all()):
         raise InputError("gaps must be finite numbers ≥ 0", allowed="0 in contact")
-    open_gap = np.where(gap > _LEAST_GAP * gap.max(), gap, 0.0)
+    open_gap = open_gaps(gap, gap.max())
     found = None
     shorter, longer = sorted(gap.shape)
     if shorter**2 > _MOST_FACTORISED and longer <= _THIN * shorter:
@@ -292,6 +292,16 @@ def _factorised_flow(
     solution = network_flow(cell_network(turned**3, sides, periodic=periodic), banded)
     pressure = solution.potential[:-2].reshape(turned.shape)
     return (pressure.T if axis else pressure), solution.total
+
+
+def open_gaps(gap: Array, largest: float) -> Array:
+    """Return gaps, 0 where they are so small that they count as closed.
+
+    Args:
+        gap: Gaps of any shape [mm].
+        largest: The largest gap of the surface that they belong to [mm].
+    """
+    return np.where(gap > _LEAST_GAP * largest, gap, 0.0)
 
 
 def widened_gap(gap: Array, *, periodic: bool) -> Array:

@@ -361,8 +361,9 @@ class PlanePath:
 class Transmissivity:
     """Transmissivity T along x and y over the mean separation.
 
-    Between rows the hydraulic gap T^(1/3) is interpolated monotonically (PCHIP). Beyond the last
-    row it grows as the separation, and below the first one it stays.
+    Between rows the hydraulic gap T^(1/3) is interpolated monotonically (PCHIP). Over the largest
+    of the table, it is closed where gaps of cells count as closed. Beyond the last row it grows as
+    the separation, and below the first one it stays.
 
     Attributes:
         separation: Mean separations, rising, shape (m,) [mm].
@@ -428,12 +429,14 @@ class Transmissivity:
 
     @staticmethod
     def _interpolated(separation: Array, rows: Array, gaps: Array) -> Array:
+        from patchlaw.micro.transport import open_gaps  # laws without a leak do without
+
         first, last = rows[[0, -1]]
         within, beyond = np.clip(separation, first, last), np.maximum(separation - last, 0.0)
         if len(rows) == 1:
             return np.asarray((gaps + beyond[:, None]) ** 3)
         gap: Any = scipy.interpolate.PchipInterpolator(rows, gaps)(within)
-        return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)
+        return np.asarray((open_gaps(gap, gaps.max()) + beyond[:, None]) ** 3)
 
 
 def _check(record: Any, name: str, shapes: dict[str, tuple[int, ...]]) -> None:

@@ -21,7 +21,7 @@ from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import Start
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel, press_along
-from patchlaw.micro.transport import gap_flows, widened_gap
+from patchlaw.micro.transport import gap_flows, open_gaps, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support import Array, Flags, shared
 
@@ -372,6 +372,7 @@ def patch_transmissivities(
     def solve(task: int, *, widened: bool = False) -> Array:
         model, approach = tasks[task]
         gap = model.press(Control(approach=approach, tilt=tilt)).open_gap
+        gap = open_gaps(gap, gap.max())  # before it is cut, as a patch may be closed
         gap = widened_gap(gap, periodic=False) if widened else gap
         means = field_means(gap, patches.lengths, patches)
         return np.array([(one, *_of_patch(gap, patches, i)) for i, one in enumerate(means)])

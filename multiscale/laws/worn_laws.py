@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
@@ -34,7 +34,7 @@ _STEEPEST = 0.1
 class RunningInLaws:
     """N laws that depend on the depth that has worn off: a `ContactLaws` of `macro`.
 
-    Each is known over q = p^(2/3), from 0 on, at all depths on one grid of q.
+    All are known over q = p^(2/3), from 0 on, at all depths on one grid of q.
 
     Args:
         levels: The N laws at every one of L depths.
@@ -49,19 +49,20 @@ class RunningInLaws:
         self.laws, self.new = tuple(levels[0]), PatchLaws(levels[0])
         self._depths = depths
         known = [_curves_through(laws) for laws in zip(*levels, strict=True)]
-        self._touched = np.array([one is not None for one in known])
+        self._touched = np.array([len(one) > 0 for one in known])
         self._separations = np.array([law.initial_separation for law in levels[0]])
         self._flows = [[law.transmissivity for law in laws] for laws in levels]
-        curves = [one for one in known if one is not None]
-        count = max((len(one.grid) for one in curves), default=0)
-        padded = [one.padded(count) for one in curves]
         self._row = np.cumsum(self._touched) - 1
-        self._grid = np.array([one.grid for one in padded])  # (N', G), of those that are touched
-        self._values, self._slopes = (  # (4, L, N', G)
-            np.stack([getattr(one, name) for one in padded], axis=2) if padded else np.empty(0)
-            for name in ("values", "slopes")
-        )
-        self._ends = np.array([one.ends for one in padded]).T[..., None]  # (L, N', 1)
+        curves = [curve for one in known for curve in one]
+        grid = reduce(np.union1d, [curve.x for curve in curves], np.empty(0))
+        # tables end alike
+        self._grid = grid[np.append(np.diff(grid) > ROUNDING * grid[1:], True)[: len(grid)]]
+        found = np.array([_tabulated(curve, self._grid) for curve in curves])
+        shape = int(self._touched.sum()), len(levels)  # N' and L
+        found = found.reshape(*shape, 2, 4, len(self._grid))
+        self._values, self._slopes = found.transpose(2, 3, 1, 0, 4)  # (4, L, N', G)
+        ends = np.array([curve(curve.x[-1])[0] for curve in curves])
+        self._ends = ends.reshape(*shape, 1).swapaxes(0, 1)  # (L, N', 1)
 
     def __len__(self) -> int:
         return len(self._touched)
@@ -108,8 +109,8 @@ class RunningInLaws:
         if len(at := np.flatnonzero(self._touched[patch])):
             deep = np.broadcast_to(depth, pressure.shape)[at]
             between = _between(self._depths[:, patch[at]], deep, self._row[patch[at]])
-            grid, q = self._grid[between[-1]], np.maximum(pressure[at], 0.0) ** (2 / 3)
-            piece = np.clip((grid <= q[:, None]).sum(axis=1) - 1, 0, grid.shape[1] - 2)
+            q = np.maximum(pressure[at], 0.0) ** (2 / 3)
+            piece = np.searchsorted(self._grid[1:-1], q, side="right")
             start, width, closures = self._pieces(between, piece, 0)
             value, slope = _hermite((q - start) / width, *closures)
             found[:, at] = value, 1.5 * np.sqrt(q) * width / np.maximum(slope, 1e-300)
@@ -210,7 +211,8 @@ class RunningInLaws:
         self, between: Between, piece: Indices, which: Any = slice(None)
     ) -> tuple[Any, ...]:
         """Return where pieces of the grid start, their widths, and the cubics of columns there."""
-        (start, end), both = self._grid[between[-1], [piece, piece + 1]], (piece, piece + 1)
+        both = piece, piece + 1
+        start, end = (self._grid[at] for at in both)
         width, columns = end - start, (self._values[which], self._slopes[which])
         values, slopes = ([_blended(one, between, at) for at in both] for one in columns)
         return start, width, values + [width * one for one in slopes]
@@ -223,7 +225,7 @@ class RunningInLaws:
             between: Where depths lie between the levels.
         """
         level, _, rate, row = between
-        last, low = self._grid.shape[1] - 1, np.zeros(len(closure), np.intp)
+        last, low = len(self._grid) - 1, np.zeros(len(closure), np.intp)
         high = np.full(len(closure), last)
         for _ in range(last.bit_length() + 1):
             middle = (low + high) // 2
@@ -414,45 +416,16 @@ def _between(levels: Array, depth: Array, law: Indices) -> Between:
     return level, share, inside / (width * np.maximum(first, depth)), law
 
 
-class _Curves(NamedTuple):
-    """What a law is over q = p^(2/3), at all depths on one grid of q.
-
-    Attributes:
-        grid: Values of q, from 0, shape (G,) [MPa^(2/3)].
-        values: Closures, contact area fractions, mean gaps and contacts, shape (4, L, G).
-        slopes: Their derivatives by q.
-        ends: Closures at the ends of the laws, shape (L,) [mm].
-    """
-
-    grid: Array
-    values: Array
-    slopes: Array
-    ends: Array
-
-    def padded(self, count: int) -> _Curves:
-        """Return the same on a longer grid, along the tangents at the end."""
-        ahead = self.grid[-1] * np.arange(1, count - len(self.grid) + 1)
-        slopes = np.repeat(self.slopes[..., -1:], len(ahead), axis=2)
-        values = self.values[..., -1:] + slopes * ahead
-        return self._replace(
-            grid=np.append(self.grid, self.grid[-1] + ahead),
-            values=np.append(self.values, values, axis=2),
-            slopes=np.append(self.slopes, slopes, axis=2),
-        )
-
-
-def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
-    """Interpolate the rows of the laws at all depths (PCHIP), with tangents beyond their ends.
+def _curves_through(laws: Sequence[PatchLaw]) -> list[Any]:
+    """Interpolate closure, area, mean gap and contacts of a law over q, at all depths (PCHIP).
 
     At depths at which a patch stays open it has the law of the nearest one at which it does not,
-    from where its plane comes no further. None where it stays open at all.
+    from where its plane comes no further. There are none where it stays open at all.
     """
     known = [_rows_of(law) for law in laws]
     touched = [level for level, rows in enumerate(known) if len(rows) > 1]
-    if not touched:
-        return None
-    curves, ends = [], []
-    for level, law in enumerate(laws):
+    curves = []
+    for level, law in enumerate(laws if touched else ()):
         nearest = min(touched, key=lambda one: abs(one - level))
         rows, moved = known[nearest], law.first_touch - known[nearest].closure[0]
         closure = rows.closure + (0.0 if nearest == level else moved)
@@ -461,12 +434,7 @@ def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
         columns = closure, rows.contact_area_fraction, gap, rows.contacts
         rows_at = np.array(columns, float)[:, once]
         curves.append(scipy.interpolate.PchipInterpolator(q, rows_at, axis=1))
-        ends.append(closure[-1])
-    grid = reduce(np.union1d, [curve.x for curve in curves])
-    grid = grid[np.append(np.diff(grid) > ROUNDING * grid[1:], True)]  # tables end alike
-    found = [_tabulated(curve, grid) for curve in curves]
-    values, slopes = (np.stack(one, axis=1) for one in zip(*found, strict=True))
-    return _Curves(grid, values, slopes, np.array(ends))
+    return curves
 
 
 def _rows_of(law: PatchLaw) -> LawRows:

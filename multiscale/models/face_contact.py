@@ -18,6 +18,7 @@ from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.worn_laws import RunningInLaws
 from patchlaw.multiscale.loading.load_step import CLEAR, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support import Array, Indices, InputError, NotConverged
@@ -130,7 +131,7 @@ class FaceContact(LawModel):
             separation, cause = separation + self.wear_errors[3], None
         for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
             at = patch == index
-            if self.table.running_in is not None:
+            if isinstance(self._laws, RunningInLaws):
                 found[at] = self._laws.leak(index, separation[at], depth[at], cause, error)
             elif law.transmissivity is not None:
                 found[at] = law.transmissivity.varied(cause, separation[at], error)

@@ -12,6 +12,7 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flows
 from patchlaw.multiscale.laws import transmissivity
+from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.multiscale.laws.transmissivity import (
     flow_memory,
     patch_transmissivities,
@@ -51,6 +52,17 @@ def test_no_contact_of_a_table_is_solved_twice(monkeypatch):
     table = sample_transmissivity([model], np.zeros_like)
     assert not table.hydraulic_gap[0].any()  # it closes
     assert len(set(pressed)) == len(pressed)
+
+
+def test_a_table_is_closed_where_cells_are():
+    """Beside a closed row the interpolant falls to 1e-21 of the flow and less; cells say 0."""
+    gap = np.array([[0.0, 0.0], [0.0, 3.1e-4], [8.3e-4, 9.7e-4]])
+    none = np.zeros_like(gap)
+    rows = np.array([2.3e-4, 5.9e-4, 1.1e-3])
+    table = Transmissivity(separation=rows, hydraulic_gap=gap, on_half=gap, scatter=none)
+    found = table.at(rows[1] + np.array([0.0, 1e-8, 1e-5]))
+    assert found[:, 0].tolist()[:2] == [0.0, 0.0] and 0.0 < found[2, 0] < found[2, 1]
+    np.testing.assert_allclose(np.cbrt(table.at(rows)), gap, rtol=1e-12)
 
 
 @pytest.mark.long
