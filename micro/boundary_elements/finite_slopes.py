@@ -278,7 +278,7 @@ class SurfaceStress(Protocol):
 
 _DEEP = 8.0
 """Range of heights, in cells, from which on loads that vary from cell to cell count heights from
-their own in the first order, too. Forces of blocks with 24 cells of range change by XX by it."""
+their own in the first order, too. A force with a range of 15 cells changes by 1.6e-5."""
 _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 """Of xx, yy and xy, as yx is there too."""
 
