@@ -234,18 +234,20 @@ def narrowest_link(
     Source:
         Camerini 1978, doi 10.1016/0020-0190(78)90030-3.
     """
-    order = np.argsort(-conductance, kind="stable")
-    tail, head = tail[order], head[order]
-    while len(order) > 1:
-        half, size = len(order) // 2, int(max(tail.max(), head.max(), *ends)) + 1
+    link = np.arange(len(tail))
+    while len(link) > 1:
+        half, size = len(link) // 2, int(max(tail.max(), head.max(), *ends)) + 1
+        order = np.argpartition(-conductance[link], half - 1)
+        link, tail, head = link[order], tail[order], head[order]
         wide = sparse.coo_matrix((np.ones(half), (tail[:half], head[:half])), (size, size))
         joined = csgraph.connected_components(wide, directed=False)[1]
         if joined[ends[0]] == joined[ends[1]]:
-            order, tail, head = order[:half], tail[:half], head[:half]
+            link, tail, head = link[:half], tail[:half], head[:half]
         else:
-            ends = joined[ends[0]], joined[ends[1]]
-            order, tail, head = order[half:], joined[tail[half:]], joined[head[half:]]
-    return int(order[0])
+            ends, tail, head = (joined[ends[0]], joined[ends[1]]), joined[tail], joined[head]
+            apart = tail != head
+            link, tail, head = link[apart], tail[apart], head[apart]
+    return int(link[0])
 
 
 def factorised(matrix: sparse.csr_matrix) -> Inverse:
