@@ -307,7 +307,7 @@ class _Turned:
         wide = self.cubes >= most
         node = self.pools(wide)
         node[~wide] = node.max() + 1 + np.arange(wide.size - wide.sum())
-        cells, parts = np.arange(wide.size).reshape(wide.shape), []
+        cells, parts = np.arange(wide.size, dtype=np.intc).reshape(wide.shape), []
         for link, places, (tail, head) in zip(self.links, _ends(cells), _ends(node), strict=True):
             some = (tail != head) & (link >= least)
             parts.append([one[some] for one in (*places, tail, head, link)])

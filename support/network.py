@@ -1,4 +1,4 @@
-"""Networks of conductances between two terminals: the widest path, and the flow through them.
+"""Networks of conductances between two terminals: narrowest links, and the flow through them.
 
 A network has n nodes, the inlet and the outlet. Flow from a node to its neighbour is their
 conductance times the difference of their potentials, as with resistors.
