@@ -1,6 +1,7 @@
 """CPU time of leaks over that of the contact solutions that they belong to, in one process.
 
-First single maps of gaps, in both directions; then the table of a law of samples. Only ratios
+First single maps of gaps, in both directions, with the constrictions that a stated leak has; then
+the table of a law of samples. Only ratios
 count, as the machine may do other things. Run from the project's root; it takes two minutes:
 
     .venv/bin/python benchmarks/leak_cost.py
@@ -31,8 +32,15 @@ def sample(cells, **waves):
     return synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
 
 
+def stated(gap):
+    """Return the shares of the flow through the constrictions along both axes."""
+    return [flow.constriction.share for flow in gap_flows(gap, (1.0, 1.0), periodic=True)]
+
+
 def main():
-    print("cells | contact area | contact [s] | flows along x and y [s] | ratio")
+    print(
+        "cells | contact area | contact [s] | flows along x and y [s] | constrictions [s] | ratio"
+    )
     for cells in (64, 128, 256, 512):
         model = HalfSpaceModel(
             sample(cells, waves=(2, cells // 6)), contact_modulus=MODULUS, periodic=True
@@ -41,8 +49,12 @@ def main():
             contact, state = least(lambda m=model, p=pressure: m.solve_force(p))
             gap = state.open_gap
             flows, _ = least(lambda g=gap: gap_flows(g, (1.0, 1.0), periodic=True))
+            both, _ = least(lambda g=gap: stated(g))
             area = state.contact_area_fraction
-            print(f"{cells}² | {area:.3f} | {contact:.3f} | {flows:.3f} | {flows / contact:.1f}")
+            print(
+                f"{cells}² | {area:.3f} | {contact:.3f} | {flows:.3f} | {both - flows:.3f}"
+                f" | {both / contact:.1f}"
+            )
     print("\nlaw of a sample up to a pressure | law [s] | its leak [s] | rows | ratio")
     for cells in (64, 128):
         for waves in ({"waves": (2, cells // 6)}, {"waves_x": (2, cells // 6), "waves_y": (0, 3)}):

@@ -164,8 +164,8 @@ FAULTS = [
     # flow, heat
     Fault(
         "micro",
-        "return cell_network(turned**3, sides",
-        "return cell_network(turned**2, sides",
+        "self.gap * self.gap * self.gap",
+        "self.gap * self.gap",
         "unit/micro/flow/test_gap_flow.py",
     ),
     Fault(

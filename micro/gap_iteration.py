@@ -69,7 +69,7 @@ def cell_flows(
     size, levels, flowing = float(gap.max(initial=0.0)), [], []
     pools, count = ndimage.label(gap > 0.0)
     for axis in axes:
-        joined = _joined(pools, count, 1 - axis) if periodic else np.arange(count + 1)
+        joined = joined_pools(pools, count, 1 - axis) if periodic else np.arange(count + 1)
         ends = [joined[np.unique(pools.take(side, axis))] for side in (0, -1)]
         by_pool, through = np.full(count + 1, np.nan), np.intersect1d(*ends)
         for one, value in zip(ends, (1.0, 0.0), strict=True):
@@ -93,7 +93,7 @@ def cell_flows(
     return [(found[k], flow) for k, flow in enumerate(flows.tolist())]
 
 
-def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
+def joined_pools(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
     """Return a number for each pool that those share which paths over sides join, 0 for contact.
 
     Args:

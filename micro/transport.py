@@ -26,15 +26,15 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from patchlaw.support import Array, InputError
-from patchlaw.support.network import Network, NetworkFlow, banded, network_flow
+from patchlaw.support import Array, Flags, Indices, InputError
+from patchlaw.support.network import Network, banded, narrowest_link, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
@@ -46,6 +46,10 @@ _MOST_FACTORISED, _THIN = 72**2, 8
 took 20, 34 and 51 ms of CPU so on 64², 80² and 96² cells, at 2 % contact, and 21, 30 and 32 ms by
 multigrid. And how many times as many along the other side: those of thin maps, halved as often as
 their long side, would be filled up to many times their number."""
+
+
+_LEVELS = 32
+"""Cells whose gaps are tried for that of the narrowest place; others lie between two of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,48 +65,6 @@ class Constriction:
     place: tuple[float, float]
     gap: float
     share: float
-
-    @property
-    def turned(self) -> Constriction:
-        """The constriction of a map whose axes are swapped."""
-        return replace(self, place=(self.place[1], self.place[0]))
-
-
-def critical_constriction(
-    network: Network, solution: NetworkFlow, gap: Array, lengths: tuple[float, float]
-) -> Constriction:
-    """Return the critical constriction of a flow along x.
-
-    What passes through its channel is seen along the line of equal fluid pressure through it, from
-    contact to contact.
-
-    Args:
-        network: The network of the cells; its inlet and outlet are linked.
-        solution: The flow through it.
-        gap: Gaps of the cells, shape (nx, ny) [mm].
-        lengths: Sides of the map [mm].
-    """
-    link = network.narrowest
-    ends = [int(one) for one in (network.tail[link], network.head[link]) if one < network.count]
-    cell = min(ends, key=lambda one: float(gap.flat[one]))
-    potential, flow = solution.potential, solution.flow
-    level = 0.5 * (potential[network.tail[link]] + potential[network.head[link]])
-    above = potential > level
-    crossing = above[network.tail] != above[network.head]
-    beside = np.zeros(network.count + 2, bool)
-    beside[network.tail[crossing]] = beside[network.head[crossing]] = True
-    beside[network.count :] = False  # all cells of a side are joined by its terminal
-    joined = network.only(beside[network.tail] & beside[network.head]).joined
-    channel = joined == joined[cell]
-    crossing &= channel[network.tail] | channel[network.head]
-    downwards = np.where(above[network.tail], flow, -flow)
-    index = np.unravel_index(cell, gap.shape)
-    x, y = (
-        float((i + 0.5) * length / n)
-        for i, length, n in zip(index, lengths, gap.shape, strict=True)
-    )
-    share = float(downwards[crossing].sum()) / solution.total
-    return Constriction(place=(x, y), gap=float(gap.flat[cell]), share=min(share, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,26 +93,6 @@ class GapFlow:
     def percolates(self) -> bool:
         """Whether an open path leads from side to side."""
         return self.total > 0.0
-
-    @property
-    def network(self) -> Network:
-        """The network of the cells, those of a map with its axes swapped for a flow along y.
-
-        It takes several times the memory of the map, and is made anew each time.
-        """
-        turned, sides = _turned(self.gap, self.lengths, self.axis)
-        return cell_network(turned**3, sides, periodic=self.periodic)
-
-    @property
-    def solution(self) -> NetworkFlow:
-        """The flow through the network, none in pools that no path from a side leads to."""
-        return self._through(self.network)
-
-    def _through(self, network: Network) -> NetworkFlow:
-        turned, _ = _turned(self.pressure, self.lengths, self.axis)
-        potential = np.append(turned, (1.0, 0.0))
-        flow = np.nan_to_num(network.flow(potential), copy=False)
-        return NetworkFlow(total=self.total, potential=potential, flow=flow)
 
     @property
     def transmissivity(self) -> float:
@@ -187,34 +129,47 @@ class GapFlow:
 
         1 is that between parallel plates at the mean gap.
         """
-        network, size = self.network, self.gap.size + 2
-        flow = self._through(network).flow
-        row = self.gap.shape[1 - self.axis]
-        across = network.tail // row == network.head // row
-        plates = float(self.gap.mean()) ** 3 / self.lengths[self.axis]
-        parts = []
-        for links, axis in ((~across, self.axis), (across, 1 - self.axis)):
-            # each cell has the mean of what passes through two opposite faces
-            through = np.bincount(network.tail[links], flow[links], minlength=size)
-            through += np.bincount(network.head[links], flow[links], minlength=size)
-            width = self.lengths[1 - axis] / self.gap.shape[1 - axis]
-            parts.append(self._oriented(0.5 * through[: network.count]) / (width * plates))
-        return (parts[1], parts[0]) if self.axis else (parts[0], parts[1])
+        turned = _Turned(self)
+        (along, across), (length, width) = turned.flows, turned.sides
+        plates = float(self.gap.mean()) ** 3 / length
+        # each cell has the mean of what passes through two opposite faces
+        first = 0.5 * (along[:-1] + along[1:]) / (width / across.shape[1] * plates)
+        second = 0.5 * (across + np.roll(across, 1, axis=1)) / (length / len(across) * plates)
+        return (second.T, first.T) if self.axis else (first, second)
 
     @cached_property
     def constriction(self) -> Constriction | None:
-        """The critical constriction; None where nothing flows."""
+        """The critical constriction; None where nothing flows.
+
+        What passes through its channel is seen along the line of equal fluid pressure through it,
+        from contact to contact.
+        """
         if not self.percolates:
             return None
-        gap, lengths = _turned(self.gap, self.lengths, self.axis)
-        network = self.network
-        found = critical_constriction(network, self._through(network), gap, lengths)
-        return found.turned if self.axis else found
-
-    def _oriented(self, values: Array) -> Array:
-        """Return values of the network's nodes on the map."""
-        nx, ny = self.gap.shape
-        return values.reshape(ny, nx).T if self.axis else values.reshape(nx, ny)
+        turned = _Turned(self)
+        ends = turned.narrowest()
+        cell = min(ends, key=turned.cubes.item)
+        above = turned.pressure > turned.pressure.flat[ends].mean()
+        along, across = turned.flows
+        along[above[:-1] == above[1:]] = 0.0
+        across[above[1:-1] == np.roll(above[1:-1], -1, axis=1)] = 0.0
+        beside = (along[:-1] != 0.0) | (along[1:] != 0.0)
+        beside |= (across != 0.0) | (np.roll(across, 1, axis=1) != 0.0)
+        channel = np.zeros(above.shape, bool)  # all cells of a side are joined by its terminal
+        pools = turned.pools(beside)
+        channel[1:-1] = beside & (pools == pools.flat[cell - above.shape[1]])
+        share = sum(
+            np.abs(flow[tail | head]).sum()
+            for flow, (tail, head) in zip((along, across), _ends(channel), strict=True)
+        )
+        x, y = np.divmod(cell, above.shape[1])
+        length, width = turned.sides
+        place = float((x - 0.5) * length / len(across)), float((y + 0.5) * width / above.shape[1])
+        return Constriction(
+            place=place[::-1] if self.axis else place,
+            gap=float(turned.gap.flat[cell - above.shape[1]]),
+            share=min(float(share) / self.total, 1.0),
+        )
 
 
 def gap_flow(
@@ -304,6 +259,115 @@ def open_gaps(gap: Array, largest: float) -> Array:
     return np.where(gap > _LEAST_GAP * largest, gap, 0.0)
 
 
+class _Turned:
+    """A flow along x through a map whose sides are terminals: lines of infinitely wide cells.
+
+    Args:
+        flow: The flow, whose axes are swapped if it leads along y.
+
+    Attributes:
+        gap: Gaps, shape (nx, ny) [mm].
+        sides: Sides of the map [mm].
+        cubes: Their g³ with the terminals, shape (nx + 2, ny) [mm³].
+        pressure: Fluid pressures, likewise.
+        links: See `cell_links`.
+    """
+
+    def __init__(self, flow: GapFlow) -> None:
+        self.gap, self.sides = _turned(flow.gap, flow.lengths, flow.axis)
+        nx, ny = self.gap.shape
+        self.cubes, self.pressure = np.full((nx + 2, ny), np.inf), np.ones((nx + 2, ny))
+        self.cubes[1:-1] = self.gap * self.gap * self.gap
+        self.pressure[1:-1], _ = _turned(flow.pressure, flow.lengths, flow.axis)
+        self.pressure[-1] = 0.0
+        self._periodic = flow.periodic
+        self.links = cell_links(self.cubes[1:-1], self.sides, periodic=flow.periodic)
+
+    @property
+    def flows(self) -> list[Array]:
+        """Flows through the links, 0 in pools that no path from a side leads to."""
+        ends = zip(self.links, _ends(self.pressure), strict=True)
+        return [np.nan_to_num(link * (tail - head), copy=False) for link, (tail, head) in ends]
+
+    def pools(self, some: Flags) -> NDArray[np.integer]:
+        """Return a number for each of some cells that those share which paths join, 0 of others."""
+        from scipy import ndimage
+
+        from patchlaw.micro.gap_iteration import joined_pools
+
+        pools, count = ndimage.label(some)
+        return joined_pools(pools, count, 1)[pools] if self._periodic else pools
+
+    def narrowest(self) -> Indices:
+        """Return the cells at both ends of the narrowest link of the widest path, (2,).
+
+        A link has one to two times the narrower of its cells, times its width over its length.
+        Cells that are joined by wider links than the narrowest one are taken together.
+        """
+        known = np.unique(self.cubes[1:-1].flat[:: max(1, self.gap.size // _LEVELS)])
+        known, low, high = known[known > 0.0], -1, int((known > 0.0).sum())
+        while high - low > 1:
+            level = (low + high) // 2
+            pools = self.pools(self.cubes >= known[level])
+            low, high = (level, high) if pools[0, 0] == pools[-1, 0] else (low, level)
+        (nx, ny), (length, width) = self.gap.shape, self.sides
+        narrow, broad = sorted((length * ny / (width * nx), width * nx / (length * ny)))
+        least = 0.99 * narrow * known[low] if low >= 0 else np.finfo(float).tiny
+        most = 2.01 * broad / narrow * known[high] if high < len(known) else np.inf
+        wide = self.cubes >= most
+        node = self.pools(wide)
+        node[~wide] = node.max() + 1 + np.arange(wide.size - wide.sum())
+        cells, parts = np.arange(wide.size, dtype=np.intc).reshape(wide.shape), []
+        for link, places, (tail, head) in zip(self.links, _ends(cells), _ends(node), strict=True):
+            some = (tail != head) & (link >= least)
+            parts.append([one[some] for one in (*places, tail, head, link)])
+        first, second, tail, head, link = map(np.concatenate, zip(*parts, strict=True))
+        narrowest = narrowest_link(tail, head, link, (node[0, 0], node[-1, 0]))
+        return np.array([first[narrowest], second[narrowest]])
+
+
+def _ends(values: NDArray[Any]) -> list[tuple[NDArray[Any], NDArray[Any]]]:
+    """Return what cells at the tails and heads of links along x and along y have.
+
+    Args:
+        values: That of cells and terminals, shape (nx + 2, ny).
+    """
+    inner = values[1:-1]
+    return [(values[:-1], values[1:]), (inner, np.roll(inner, -1, axis=1))]
+
+
+def cell_links(
+    conductivity: Array,
+    lengths: tuple[float, float],
+    *,
+    across: Array | None = None,
+    periodic: bool = False,
+) -> tuple[Array, Array]:
+    """Return the conductances of links along x and along y, 0 of closed ones.
+
+    Args:
+        conductivity: See `cell_network`.
+        lengths: Likewise.
+        across: Likewise.
+        periodic: Likewise.
+
+    Returns:
+        From the inlet at x = 0 through all cells to the outlet, shape (nx + 1, ny); and from each
+        cell to the next one, from the last to the first, shape (nx, ny).
+    """
+    nx, ny = conductivity.shape
+    width = (lengths[1] / ny) / (lengths[0] / nx)
+    # half of a link between two cells lies in each of them; those to a side end there
+    with np.errstate(divide="ignore"):
+        half = 0.5 / conductivity
+        half_across = half if across is None else 0.5 / across
+    along_x = width / np.concatenate([half[:1], half[:-1] + half[1:], half[-1:]])
+    along_y = 1.0 / (width * (half_across + np.roll(half_across, -1, axis=1)))
+    if not periodic:
+        along_y[:, -1] = 0.0
+    return along_x, along_y
+
+
 def widened_gap(gap: Array, *, periodic: bool) -> Array:
     """Return gaps whose contact ends half a cell earlier on all sides, beside walls a whole cell.
 
@@ -344,25 +408,16 @@ def cell_network(
         periodic: Whether the map continues over the sides y = 0 and y = Ly.
     """
     nx, ny = conductivity.shape
-    cells = np.arange(nx * ny).reshape(nx, ny)
-    inlet, outlet = np.full(ny, cells.size), np.full(ny, cells.size + 1)
-    last = ny if periodic else ny - 1
-    # half of a link between two cells lies in each of them; those to a side end there
-    with np.errstate(divide="ignore"):
-        half = 0.5 / conductivity
-        half_across = half if across is None else 0.5 / across
-    along_x = np.concatenate([half[:1], half[:-1] + half[1:], half[-1:]]).ravel()
-    along_y = (half_across + np.roll(half_across, -1, axis=1))[:, :last].ravel()
-    width = (lengths[1] / ny) / (lengths[0] / nx)
-    resistance = np.concatenate([along_x / width, along_y * width])
-    is_open = np.isfinite(resistance)
-    tail = np.concatenate([inlet, cells.ravel(), cells[:, :last].ravel()])
-    head = np.concatenate([cells.ravel(), outlet, np.roll(cells, -1, axis=1)[:, :last].ravel()])
+    links = cell_links(conductivity, lengths, across=across, periodic=periodic)
+    conductance = np.concatenate([one.ravel() for one in links])
+    cells = np.arange((nx + 2) * ny).reshape(nx + 2, ny) - ny
+    cells[0], cells[-1] = nx * ny, nx * ny + 1
+    (tail, head), is_open = zip(*_ends(cells), strict=True), conductance > 0.0
     return Network(
-        count=cells.size,
-        tail=tail[is_open],
-        head=head[is_open],
-        conductance=1.0 / resistance[is_open],
+        count=nx * ny,
+        tail=np.concatenate([one.ravel() for one in tail])[is_open],
+        head=np.concatenate([one.ravel() for one in head])[is_open],
+        conductance=conductance[is_open],
     )
 
 

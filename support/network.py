@@ -1,4 +1,4 @@
-"""Networks of conductances between two terminals: the widest path, and the flow through them.
+"""Networks of conductances between two terminals: narrowest links, and the flow through them.
 
 A network has n nodes, the inlet and the outlet. Flow from a node to its neighbour is their
 conductance times the difference of their potentials, as with resistors.
@@ -120,25 +120,6 @@ class Network:
             conductance=self.conductance[links],
         )
 
-    @cached_property
-    def widest_path(self) -> Indices:
-        """Numbers of the links on the widest path from the inlet to the outlet, in their order.
-
-        Its smallest conductance is the largest of all paths. It lies in the maximum spanning tree.
-        """
-        before = self._tree[1]
-        nodes = [self.outlet]
-        while nodes[-1] != self.inlet:
-            nodes.append(int(before[nodes[-1]]))
-        nodes.reverse()
-        return self._numbers(np.array(nodes[:-1]), np.array(nodes[1:]))
-
-    @property
-    def narrowest(self) -> int:
-        """Number of the link with the smallest conductance on the widest path."""
-        path = self.widest_path
-        return int(path[np.argmin(self.conductance[path])])
-
     def within_reach(self) -> Network:
         """Return the network with conductances that double precision resolves side by side.
 
@@ -231,6 +212,42 @@ class NetworkFlow:
     flow: Array
     imbalance: float = 0.0
     iterations: int = 0
+
+
+def narrowest_link(
+    tail: NDArray[np.integer],
+    head: NDArray[np.integer],
+    conductance: Array,
+    ends: tuple[int, int],
+) -> int:
+    """Return the number of the narrowest link on the widest path between two nodes.
+
+    Its conductance is the largest that the narrowest link of a path has. Where the wider half of
+    the links joins both nodes, the others are left out; otherwise nodes that it joins count as one.
+
+    Args:
+        tail: Node where each of m links begins, shape (m,).
+        head: Node where it ends, shape (m,).
+        conductance: Conductance of each link, shape (m,).
+        ends: Both nodes, which links join.
+
+    Source:
+        Camerini 1978, doi 10.1016/0020-0190(78)90030-3.
+    """
+    link = np.arange(len(tail))
+    while len(link) > 1:
+        half, size = len(link) // 2, int(max(tail.max(), head.max(), *ends)) + 1
+        order = np.argpartition(-conductance[link], half - 1)
+        link, tail, head = link[order], tail[order], head[order]
+        wide = sparse.coo_matrix((np.ones(half), (tail[:half], head[:half])), (size, size))
+        joined = csgraph.connected_components(wide, directed=False)[1]
+        if joined[ends[0]] == joined[ends[1]]:
+            link, tail, head = link[:half], tail[:half], head[:half]
+        else:
+            ends, tail, head = (joined[ends[0]], joined[ends[1]]), joined[tail], joined[head]
+            apart = tail != head
+            link, tail, head = link[apart], tail[apart], head[apart]
+    return int(link[0])
 
 
 def factorised(matrix: sparse.csr_matrix) -> Inverse:

@@ -5,8 +5,9 @@ import pytest
 from scipy import ndimage
 
 from patchlaw.micro import gap_iteration, transport
-from patchlaw.micro.transport import gap_flow, gap_flows, widened_gap
+from patchlaw.micro.transport import cell_network, gap_flow, gap_flows, widened_gap
 from patchlaw.support import InputError
+from patchlaw.support.network import narrowest_link
 
 LENGTHS = (1.3, 0.7)
 
@@ -76,6 +77,24 @@ def test_mean_flux_is_the_flow(axis):
     flow = gap_flow(rough(), LENGTHS, axis=axis)
     assert np.mean(flow.flux[axis]) == pytest.approx(flow.flow_factor, rel=1e-10)
     assert flow.flow_factor == pytest.approx(flow.transmissivity / rough().mean() ** 3, rel=1e-12)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("lengths", [(2.0, 1.5), (9.0, 0.5)])
+def test_the_narrowest_place_is_that_of_the_network_of_all_cells(lengths, periodic):
+    gap = rough(closed=0.2)
+    flow = gap_flow(gap, lengths, periodic=periodic)
+    net = cell_network(gap**3, lengths, periodic=periodic)
+    link = narrowest_link(net.tail, net.head, net.conductance, (net.inlet, net.outlet))
+    ends = [one for one in (net.tail[link], net.head[link]) if one < net.count]
+    cell = min(ends, key=gap.item)
+    place = np.add(np.unravel_index(cell, gap.shape), 0.5) * lengths / gap.shape
+    np.testing.assert_allclose(flow.constriction.place, place, rtol=1e-12)
+    assert flow.constriction.gap == gap.flat[cell]
+    # less than the whole passes, and what the link itself lets through at least
+    pressure = np.append(flow.pressure, (1.0, 0.0))
+    least = abs(net.conductance[link] * (pressure[net.tail[link]] - pressure[net.head[link]]))
+    assert least / flow.total <= flow.constriction.share * (1 + 1e-12) <= 1.0 + 1e-12
 
 
 def test_a_closed_line_lets_nothing_through():
