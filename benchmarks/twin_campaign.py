@@ -25,6 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.resumed_runs import gone_on, ran_past
 
 from benchmarks.own_program import differences_of_program
@@ -145,7 +146,10 @@ def on_ranks(data, ranks):
     """Return the tables of a scene on several ranks."""
     Path("ranks.pickle").write_bytes(pickle.dumps(data))
     words = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, __file__, "--one"]
-    done = subprocess.run([*words, "ranks.pickle"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*words, "ranks.pickle"], capture_output=True, text=True, check=False,
+        env=os.environ | BESIDE_OTHERS,  # without what MPI has set in this process
+    )  # fmt: skip
     if done.returncode:
         return {done.stderr[-300:]: ("", np.zeros(0))}
     return pickle.loads(Path("ranks.pickle").read_bytes())

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from patchlaw.micro.half_space.error_probe import ZERO
 from patchlaw.multiscale.loading.column import Mode, merged
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.measured_errors.faces import (
@@ -77,8 +78,9 @@ class VibrationObserver(StepObserver):
         with located(key="vibration.modes"):
             found, shares, moved = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
-        # the stiffness of rough contacts goes with their pressure
-        uncertain = sum(abs(one) for _, one in step.errors) / (step.force_N or 1.0)
+        # the stiffness of rough contacts goes with their pressure, which under a force has no zero
+        others = (one for cause, one in step.errors if not (step.by_force and cause == ZERO))
+        uncertain = sum(map(abs, others)) / (step.force_N or 1.0)
         by_load = 0.5 * shares * frequency * uncertain
         by_elements = self._element_errors(tangents, frequency, plane, last=last)
         whole = by_load + frequency * found.residuals

@@ -241,14 +241,12 @@ def stiffness_errors(
         errors["electrical_conductance_error_S"] = conducts * electrical
     if (thermal := step.thermal_conductance_W_per_K) is not None:
         gaps = step.gap_conductance_W_per_K or 0.0
-        error = conducts * (thermal - gaps)
+        through = step.gap_conductance_error_W_per_K or 0.0
         if gaps:
             is_open = 1.0 - step.contact_area_fraction
-            others = gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
-            through = (step.gap_conductance_error_W_per_K or 0.0) + others
-            errors["gap_conductance_error_W_per_K"] = through
-            error += through
-        errors["thermal_conductance_error_W_per_K"] = error
+            through += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
+        errors["gap_conductance_error_W_per_K"] = through
+        errors["thermal_conductance_error_W_per_K"] = conducts * (thermal - gaps) + through
     return errors
 
 

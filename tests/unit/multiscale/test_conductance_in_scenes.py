@@ -54,8 +54,8 @@ def test_gas_next_to_contacts_errs_by_the_size_of_the_cells(load):
 
 
 def test_contacts_conduct_by_the_stiffness_of_the_interface():
-    asked = scene(micro={"finite_slopes": False})
-    model, setup = None, make_setup(asked)
+    asked = scene(micro={"finite_slopes": False}).with_({"output.check": "last"})
+    setup = make_setup(asked)
     model = HalfSpaceModel(
         setup.parts.surface, contact_modulus=setup.parts.materials.contact_modulus
     )
@@ -68,6 +68,7 @@ def test_contacts_conduct_by_the_stiffness_of_the_interface():
         expected = 2.0 * PAIR / model.contact_modulus * rate * 1e-3  # N/mm / MPa = mm
         assert conductance == pytest.approx(expected, rel=1e-4)
     assert (history.gap_conductance_W_per_K == 0.0).all()
+    assert history[-1].gap_conductance_error_W_per_K == 0.0  # nothing is not off
     assert np.isnan(history.electrical_conductance_S).all()
 
 

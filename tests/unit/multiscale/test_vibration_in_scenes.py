@@ -8,7 +8,7 @@ from helpers.resumed_runs import gone_on, ran_past
 from scipy.optimize import brentq
 
 from patchlaw.macro.contact.face_vibration import FaceVibration
-from patchlaw.multiscale import Run, Scene, make_setup, read_history
+from patchlaw.multiscale import Run, Scene, make_setup, read_history, run
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support import InputError, NotConverged
 
@@ -57,6 +57,22 @@ def test_more_modes_than_linear_elements_have_come_without_the_elements_error():
     assert len(step.modes) == 20  # and 16 of linear elements
     assert step.modes[0].element_error_Hz is None and step.first_frequency_error_Hz > 0.0
     run.close()
+
+
+@pytest.mark.long
+def test_under_a_force_frequencies_do_not_err_by_what_approaches_count_from():
+    output = {"check": "last", "figures": False, "report": False, "fields": False}
+    load = {"pressure": "5 MPa", "steps": 1}
+    found = [
+        run(scene(vibration={"modes": 2}, output=output, load=load | zero))[-1]
+        for zero in ({}, {"zero": "mean plane"})
+    ]
+    assert dict(found[0].errors)["zero"] > 1e-3 * found[0].force_N
+    one, other = (
+        [mode.frequency_error_Hz - mode.element_error_Hz for mode in step.modes] for step in found
+    )
+    assert max(one) > 0.1
+    assert one == pytest.approx(other, rel=1e-6, abs=1e-5)
 
 
 @pytest.fixture(scope="module")
