@@ -221,7 +221,9 @@ def read_off(seed, folder, shapes, rubs, steep):
         of_shear, of_lost = sum(errors.shear[c] for c in BY)
         by_name["shear"] = of_shear, np.hypot(*(other - one)), np.hypot(*one)
         by_name["energy lost"] = of_lost, *_change(step, true, "dissipated_mJ")
-    relative = {name: np.abs([stated, err]) / of for name, (stated, err, of) in by_name.items()}
+    relative = {
+        name: np.abs([stated, err]) / abs(of) for name, (stated, err, of) in by_name.items()
+    }
     return body.name.replace("pad", shape), unknowns, relative
 
 
@@ -255,7 +257,9 @@ def reading(choice):
             if found is None:
                 continue
             name, unknowns, errors = found
-            ratios.append([true / stated for stated, true in errors.values()])
+            ratios.append(
+                [true / stated if true > ROUNDING else 0.0 for stated, true in errors.values()]
+            )
             told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors.values())
             if COMM.rank == 0:
                 took = time.process_time() - began
