@@ -10,10 +10,12 @@ With `--contacts` a rough rectangle of `--cells` cells a side is pressed on ever
 `concurrent`, and shifted. Its force and its shear force are compared with those on cells cut into
 eight once more. Both are in 6 modes a side, whose own error is left out.
 
-With `--friction` level bodies are pressed by a force and sheared in part, every other one by a
-shear force: those of `--shapes`, by default all, where `block` is a pad of one material. Errors by
-elements and quadrature of force, shear, energy lost to friction and area are compared with
-quadratic elements on every cell cut into eight.
+With `--read` level bodies are pressed by a force: those of `--shapes`, by default all, where
+`block` is a pad of one material. Errors by elements and quadrature of the force, contact area, mean
+gap and stiffness of the interface are compared with quadratic elements on every cell cut into
+eight. With `--friction` bodies are sheared in part besides, every other one by a shear force, and
+shear and energy lost to friction are compared, too. `--steep` takes 3 % of the slopes of the
+roughness.
 """
 
 import os
@@ -53,10 +55,12 @@ from patchlaw.macro.mesh.from_file import refined
 from patchlaw.micro import BodyModes, TractionModes
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.bodies import face_terms
+from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
 from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
 
 COMM = MPI.COMM_WORLD
 ALLOWED = 1.5  # true over stated
+BY = "mesh", "quadrature"
 ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform state has no error
 
 
@@ -146,12 +150,12 @@ def shape_of(body, shape):
     return replace(body, size=max(body.size, body.length / fewest), tilt=(0.0, 0.0), **changes)
 
 
-def sheared(seed, folder, shapes):
-    """Press a rough body, and shear it in part.
+def read_off(seed, folder, shapes, rubs, steep):
+    """Press a rough body, and shear it in part where it rubs.
 
     Returns:
-        Its name, its unknowns, and of the force, the shear, the energy lost to friction and the
-        area the stated and the true error, relative, shape (4, 2); None for others and large ones.
+        Its name, its unknowns, and by quantity the stated and the true error, relative; None for
+        others and large ones.
     """
     shape, body = shapes[seed % len(shapes)], drawn(seed)
     if shapes == SHAPES and body.tilt is not None and any(body.tilt):
@@ -171,65 +175,96 @@ def sheared(seed, folder, shapes):
     data = dict(rough_scene(body, mesh, seed, accuracy=0.05).written)
     del data["accuracy"]  # the body stays as it is
     data["surface"] = {**data["surface"], "grid": [32, 32]}
+    if steep:
+        spectrum = data["surface"]["spectrum"]
+        data["surface"]["spectrum"] = spectrum | {"rms_slope": 0.03 * spectrum["rms_slope"]}
     data["body"] = {**data["body"], "element": ("linear", "quadratic")[body.order - 1]}
-    data |= {"coupling": {"table_tolerance": 0.01}, "friction": {"coefficient": coefficient}}
+    data |= {"coupling": {"table_tolerance": 0.01}}
+    if rubs:
+        data |= {"friction": {"coefficient": coefficient}}
 
-    def step_of(key, size, check="none", **sections):
+    def step_of(size=0.0, key="shear", check="none", **sections):
         shear = [[size * float(np.cos(way)), size * float(np.sin(way))]]
-        sections["load"] = {**data["load"], key: shear, "shear_steps": 2}
+        sections["load"] = data["load"] | ({key: shear, "shear_steps": 2} if rubs else {})
         sections["output"] = {**data["output"], "check": check}
-        return pressed(Scene.from_dict(data | sections))
+        run = Run(Scene.from_dict(data | sections))
+        *_, step = run.load_steps()
+        stiffness = run.coupling.model.stiffness().interface
+        run.close()
+        return replace(step, interface_stiffness_N_per_mm=stiffness)
 
-    size, key = share * coefficient * step_of("shear", 1e-12).force_N, "shear_force"
-    if seed % 2:  # the shift under it
-        at = step_of(key, size)
-        size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
+    size, key = 0.0, "shear_force"
+    if rubs:
+        size = share * coefficient * step_of(1e-12).force_N
+        if seed % 2:  # the shift under it
+            at = step_of(size, key)
+            size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
     with measured() as found:
-        step = step_of(key, size, check="last")
-    true = step_of(key, size, body={**data["body"], "mesh": finer, "element": "quadratic"})
+        step = step_of(size, key, check="last")
+    true = step_of(size, key, body={**data["body"], "mesh": finer, "element": "quadratic"})
     (errors,) = found
-    by = [np.array([*errors.by_cause[c][:2], *errors.shear[c]]) for c in ("mesh", "quadrature")]
-    of_force, of_area, of_shear, of_lost = sum(by)
+    of_force, of_area, of_gap, of_stiffness = sum(errors.by_cause[c] for c in BY)[:4]
     # the error of the approach is that of the force over the stiffness against it
-    force = of_force, errors.stiffness * (true.approach_mm - step.approach_mm)
-    read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
-    one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
-    shear = of_shear, np.hypot(*(other - one))
-    lost = of_lost, true.dissipated_mJ - step.dissipated_mJ
-    area = of_area, true.contact_area_fraction - step.contact_area_fraction
-    sizes = step.force_N, np.hypot(*one), step.dissipated_mJ, step.contact_area_fraction
-    name = body.name.replace("pad", shape)
-    return name, unknowns, np.abs([force, shear, lost, area]) / np.array(sizes)[:, None]
+    force = of_force, errors.stiffness * (true.approach_mm - step.approach_mm), step.force_N
+    area = of_area, *_change(step, true, "contact_area_fraction")
+    gap = of_gap, *_change(step, true, "mean_separation_mm")
+    change, own = _change(step, true, "interface_stiffness_N_per_mm")
+    by_name = {
+        "force": force,
+        "area": area,
+        "gap": gap,
+        "stiffness": (of_stiffness * own, change, own),
+    }
+    if rubs:
+        read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
+        one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
+        of_shear, of_lost = sum(errors.shear[c] for c in BY)
+        by_name["shear"] = of_shear, np.hypot(*(other - one)), np.hypot(*one)
+        by_name["energy lost"] = of_lost, *_change(step, true, "dissipated_mJ")
+    relative = {
+        name: np.abs([stated, err]) / abs(of) for name, (stated, err, of) in by_name.items()
+    }
+    return body.name.replace("pad", shape), unknowns, relative
+
+
+def _change(step, true, name):
+    """Return what a column errs by, and its size."""
+    own = getattr(step, name)
+    return getattr(true, name) - own, own
 
 
 @contextmanager
 def measured():
-    """Yield a list that gets what is measured of errors in shear."""
-    found, usual = [], LawShearProbe.measure
-    LawShearProbe.measure = lambda probe: found.append(usual(probe)) or found[-1]
+    """Yield a list that gets the errors that are measured under laws."""
+    found, usual = [], {probe: probe.measure for probe in (LawErrorProbe, LawShearProbe)}
+    for probe, measure in usual.items():
+        probe.measure = lambda self, measure=measure: found.append(measure(self)) or found[-1]
     try:
         yield found
     finally:
-        LawShearProbe.measure = usual
+        for probe, measure in usual.items():
+            probe.measure = measure
 
 
-def with_friction(choice):
-    """Compare stated and true errors of bodies under laws with friction."""
+def reading(choice):
+    """Compare stated and true errors of what is read off bodies under laws."""
     ratios, seed = [], choice.first - 1
     with tempfile.TemporaryDirectory() as folder:
         while len(ratios) < choice.bodies:
             began = time.process_time()
-            found = sheared(seed := seed + 1, folder, tuple(choice.shapes))
+            shapes = tuple(choice.shapes)
+            found = read_off(seed := seed + 1, folder, shapes, choice.friction, choice.steep)
             if found is None:
                 continue
             name, unknowns, errors = found
-            ratios.append(errors[:, 1] / errors[:, 0])
-            told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors)
+            ratios.append(
+                [true / stated if true > ROUNDING else 0.0 for stated, true in errors.values()]
+            )
+            told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors.values())
             if COMM.rank == 0:
                 took = time.process_time() - began
                 print(f"| {seed} | {name} | {unknowns} | {told} | {took:.0f} s |", flush=True)
-    names = "force", "shear", "energy lost", "area"
-    for name, some in zip(names, np.transpose(ratios), strict=True):
+    for name, some in zip(errors, np.transpose(ratios), strict=True):
         tell(name, some, np.sum(some <= ALLOWED))
 
 
@@ -247,11 +282,14 @@ def main():
     parser.add_argument("--bodies", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--contacts", action="store_true")
+    parser.add_argument("--read", action="store_true")
     parser.add_argument("--friction", action="store_true")
+    parser.add_argument("--steep", action="store_true")
     parser.add_argument("--shapes", nargs="+", choices=(*SHAPES, "block"), default=SHAPES)
     parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])
     choice = parser.parse_args()
-    (contacts if choice.contacts else with_friction if choice.friction else under_laws)(choice)
+    read = choice.read or choice.friction
+    (contacts if choice.contacts else reading if read else under_laws)(choice)
 
 
 def under_laws(choice):

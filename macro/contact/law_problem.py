@@ -247,21 +247,21 @@ class LawContactProblem:
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
 
-    def start_from(self, pressure: Array) -> None:
-        """Take the displacements by mean pressures of the patches for the latest solution.
+    def start_from(self, pressure: Array, tolerance: float | None = None) -> None:
+        """Take the displacements by pressures of the samples for the latest solution.
 
         Shear stresses are those of the latest load step.
 
         Args:
-            pressure: Pressures, shape (N,) [MPa].
+            pressure: Pressures of this rank's samples, shape (n,), not all 0 [MPa].
+            tolerance: Relative residual; None: that of the body's solver.
 
         Note:
             Collective; one linear solve.
         """
-        if pressure.any():
-            samples = pressure[self.sampling.patch]
-            displacement, _ = self._displacement(samples, shear=self.forces.last_shear)
-            self.basis.add(displacement, samples, self.forces.last_shear)
+        shear = self.forces.last_shear
+        displacement, _ = self._displacement(pressure, tolerance, shear=shear)
+        self.basis.add(displacement, pressure, shear)
 
     def displacement_under(self, pressure: Array, shear: Array, body_state: float) -> Array:
         """Return the displacements of the body under stresses of the samples and its other loads.

@@ -19,6 +19,7 @@ from patchlaw.geometry import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block, MeshedBody
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.face_laws import Sampling
 from patchlaw.macro.contact.face_pair import FacePair
 from patchlaw.macro.contact.law_problem import LawContactProblem
 from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Outline
@@ -29,6 +30,8 @@ from patchlaw.macro.mesh.facets import facet_nodes, facets_of_cells
 from patchlaw.macro.mesh.from_file import refined
 from patchlaw.support import Array, Locals
 
+_GUESSED = 1e-4
+"""Relative residual of displacements that Newton's method starts from."""
 ChooseBody = Callable[[ElasticBody], ElasticBody]
 """Returns a body on the same mesh, with displacements of any degree."""
 
@@ -190,6 +193,24 @@ def start_from_elements(
     """
     displacement = carried(known.displacement, before, problem.face)
     problem.start_at(displacement, known.plane, body_state)
+
+
+def start_from_mesh(problem: LawContactProblem, known: FaceEquilibrium, sampling: Sampling) -> None:
+    """Take the displacements by pressures on another mesh for the latest solution of a problem.
+
+    Args:
+        problem: The problem.
+        known: A contact on the other mesh, with some force. Pressures are those of its samples that
+            are nearest.
+        sampling: The samples there.
+
+    Note:
+        Collective; one linear solve.
+    """
+    own = np.column_stack([sampling.x, sampling.y, known.sample_pressure])
+    there, here = np.concatenate(problem.face.comm.allgather(own)), problem.sampling
+    nearest = cKDTree(there[:, :2]).query(np.column_stack([here.x, here.y]))[1]
+    problem.start_from(there[nearest, 2], _GUESSED)
 
 
 def carried(displacement: Array, before: ContactFace, face: ContactFace) -> Array:

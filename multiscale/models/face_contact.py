@@ -448,7 +448,8 @@ class FaceContact(LawModel):
         if sliders is not None:
             x, y = map(float, memory.shift)
             shear = ShearControl(shift=(x, y))
-        self._problem.start_from(pressure)
+        if pressure.any():
+            self._problem.start_from(pressure[self._problem.sampling.patch])
         control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
         self._last = self._problem.solve(control)
         forces.slip_wear = worn

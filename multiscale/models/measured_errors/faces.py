@@ -435,7 +435,7 @@ class LawErrorProbe(SampleProbe):
         control, before = self.load_step(problem)
         to = self.response
         if not same:
-            problem.start_from(self.state.patch_pressure)
+            on.start_from_mesh(problem, self.state, self.problem.sampling)
         else:
             on.start_from_elements(problem, self.state, self.face, control.body_state)
             more = problem.face.body.dofs - self.face.body.dofs

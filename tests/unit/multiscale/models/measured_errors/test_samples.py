@@ -67,6 +67,17 @@ def all_measured(mesh):
     return run(scene(mesh, output={"check": "all"}))
 
 
+@pytest.mark.long
+def test_samples_whose_fewer_cells_have_no_gap_left_leave_the_errors_by_others(mesh, monkeypatch):
+    def closed(*_, **__):
+        raise InputError("a periodic surface has no gap left at this approach")
+
+    monkeypatch.setattr("patchlaw.micro.half_space.error_probe.ErrorProbe.measure", closed)
+    last = run(scene(mesh)).steps[-1]
+    unknown = {cause for cause, error in last.errors if error == math.inf}
+    assert unknown == {"grid", "slopes"} and np.isnan(last.force_error_N or math.nan)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("element", ["linear", pytest.param("quadratic", marks=pytest.mark.long)])
 def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
