@@ -58,8 +58,9 @@ twentieth."""
 _MOST_STEPS = 300
 _MOST_STARTS = 4
 """Draws of first vectors, until none of the modes that are asked for has too few of them."""
-_NEW, _COPY = 0.5, 1e-10
-"""Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
+_MUCH, _NEW, _COPY = 100.0, 0.5, 1e-10
+"""Times by which squares fall in an orthogonalisation that is repeated. Part of a vector that the
+second one leaves: less is rounding. Share of one, squared,
 among new ones that counts as a combination of the others."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
@@ -295,12 +296,15 @@ class _Span:
         """
         vectors, momenta, _ = self._parts
         rows = columns.T
-        rows = rows - self._add(rows @ momenta.T) @ vectors
-        again = self._add(rows @ momenta.T)  # what is left of one may be small
-        rows -= again @ vectors
-        moved = products(self._problem.mass, rows.T).T
-        squares = self._add(np.einsum("kn,kn->k", rows, moved))
-        lost = (again**2).sum(axis=1)
+        for last in (False, True):
+            parts = self._add(rows @ momenta.T)
+            rows = rows - parts @ vectors
+            moved = products(self._problem.mass, rows.T).T
+            squares = self._add(np.einsum("kn,kn->k", rows, moved))
+            lost = (parts**2).sum(axis=1)
+            if not last and (lost <= _MUCH * squares).all():
+                return np.stack([rows, moved]), np.sqrt(squares)
+        # what is left of one may be small
         sizes = np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
         return np.stack([rows, moved]), sizes
 
@@ -314,6 +318,8 @@ class _Span:
             apart = weights > _COPY * weights[-1]
             turned = (turned[:, apart] / np.sqrt(weights[apart])).T
             rows, momenta = turned @ rows, turned @ momenta
+            if weights[0] > weights[-1] / _MUCH:
+                break
         first, last = len(self), len(self) + len(rows)
         forces = products(self._problem.stiffness, rows.T).T
         self._room[:, first:last] = rows, momenta, forces
