@@ -36,13 +36,13 @@ _MOST_REFINED = 30
 """Corrections of modes whose residual is larger, one by one: in a span they have the rounding of
 forces that are 1e14 times as large, which those of a heavy plane on a soft law are less than."""
 _ACCURATE, _NEXT = 3e-10, 1e-6
-"""Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M, and
-of the mode beyond the wanted ones. With 1e-8 residuals of tetrahedra were 1e-6, for a fifth fewer
-cycles of multigrid."""
+"""Last correction of a mode that is accurate then, relative to the mode, in the norm of M, and of
+the mode beyond the wanted ones: residuals are 1e-8 and less."""
 _REPEATED, _UNSURE = 1e-8, 1e-10
 """Distance of squared frequencies, relative to these, within which they are one that is repeated:
 rounding and loads that are found to a tolerance part them by less. Relative error of stiffness that
-leaves open whether two modes of a face that slides have just merged or are just apart."""
+leaves open whether two modes of a face that slides have just merged or are just apart: that of
+eigenvalues of a matrix that is not symmetric, which err like the shapes."""
 NEARLY = 2e-5
 """Distance of squared frequencies, relative to these, within which rounding of the load mixes the
 shapes by more than 1e-8: what they span is accurate, so all or none of them are returned."""
@@ -60,8 +60,8 @@ _MOST_STARTS = 4
 """Draws of first vectors, until none of the modes that are asked for has too few of them."""
 _MUCH, _NEW, _COPY = 100.0, 0.5, 1e-10
 """Times by which squares fall in an orthogonalisation that is repeated. Part of a vector that the
-second one leaves: less is rounding. Share of one, squared,
-among new ones that counts as a combination of the others."""
+second one leaves: less is rounding. Share of one, squared, among new ones that counts as a
+combination of the others."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
 
@@ -380,7 +380,7 @@ class _Span:
         left = mine @ forces - (shares @ along).T @ momenta
         sizes = left, (mine @ vectors) * self._problem.diagonal
         rest, most = (np.sqrt(self._add(np.einsum("kn,kn->k", one, one))) for one in sizes)
-        return left.T, np.where(rest > _NOISE * most, rest, 0.0) / most
+        return left.T, np.where(rest > _NOISE * most, rest, 0.0) / (most + np.finfo(float).tiny)
 
 
 def _lowest(
