@@ -53,8 +53,8 @@ _GROWN = 2.0
 _BESIDE = 8
 """Modes beyond the wanted ones that are kept, so that the last of these do not converge slowly."""
 _ROOM = 5
-"""Vectors that are kept over those of a step: 4 took a fifth more cycles on a cube, and 6 saved a
-twentieth."""
+"""Vectors that are kept over those of a step: 4 took a tenth more cycles on a cube, and 6 saved a
+fortieth."""
 _MOST_STEPS = 300
 _MOST_STARTS = 4
 """Draws of first vectors, until none of the modes that are asked for has too few of them."""
