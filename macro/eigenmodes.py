@@ -35,30 +35,33 @@ _LARGEST_RESIDUAL = 1e-5
 _MOST_REFINED = 30
 """Corrections of modes whose residual is larger, one by one: in a span they have the rounding of
 forces that are 1e14 times as large, which those of a heavy plane on a soft law are less than."""
-_ACCURATE, _NEXT = 1e-10, 1e-6
-"""Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M, and
-of the mode beyond the wanted ones. With 1e-8 residuals of tetrahedra were 1e-6, for a fifth fewer
-cycles of multigrid."""
+_ACCURATE, _NEXT = 3e-10, 1e-6
+"""Last correction of a mode that is accurate then, relative to the mode, in the norm of M, and of
+the mode beyond the wanted ones: residuals are 1e-8 and less."""
 _REPEATED, _UNSURE = 1e-8, 1e-10
 """Distance of squared frequencies, relative to these, within which they are one that is repeated:
 rounding and loads that are found to a tolerance part them by less. Relative error of stiffness that
-leaves open whether two modes of a face that slides have just merged or are just apart."""
+leaves open whether two modes of a face that slides have just merged or are just apart: that of
+eigenvalues of a matrix that is not symmetric, which err like the shapes."""
 NEARLY = 2e-5
 """Distance of squared frequencies, relative to these, within which rounding of the load mixes the
 shapes by more than 1e-8: what they span is accurate, so all or none of them are returned."""
 _NOISE = 1e-14
 """Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
+_GROWN = 2.0
+"""Times by which the residual of an accurate mode grows if another one has taken its place."""
 _BESIDE = 8
 """Modes beyond the wanted ones that are kept, so that the last of these do not converge slowly."""
 _ROOM = 5
-"""Vectors that are kept over those of a step: 4 took a fifth more cycles on a cube, and 6 saved a
-twentieth."""
+"""Vectors that are kept over those of a step: 4 took a tenth more cycles on a cube, and 6 saved a
+fortieth."""
 _MOST_STEPS = 300
 _MOST_STARTS = 4
 """Draws of first vectors, until none of the modes that are asked for has too few of them."""
-_NEW, _COPY = 0.5, 1e-10
-"""Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
-among new ones that counts as a combination of the others."""
+_MUCH, _NEW, _COPY = 100.0, 0.5, 1e-10
+"""Times by which squares fall in an orthogonalisation that is repeated. Part of a vector that the
+second one leaves: less is rounding. Share of one, squared, among new ones that counts as a
+combination of the others."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
 
@@ -293,12 +296,15 @@ class _Span:
         """
         vectors, momenta, _ = self._parts
         rows = columns.T
-        rows = rows - self._add(rows @ momenta.T) @ vectors
-        again = self._add(rows @ momenta.T)  # what is left of one may be small
-        rows -= again @ vectors
-        moved = products(self._problem.mass, rows.T).T
-        squares = self._add(np.einsum("kn,kn->k", rows, moved))
-        lost = (again**2).sum(axis=1)
+        for last in (False, True):
+            parts = self._add(rows @ momenta.T)
+            rows = rows - parts @ vectors
+            moved = products(self._problem.mass, rows.T).T
+            squares = self._add(np.einsum("kn,kn->k", rows, moved))
+            lost = (parts**2).sum(axis=1)
+            if not last and (lost <= _MUCH * squares).all():
+                return np.stack([rows, moved]), np.sqrt(squares)
+        # what is left of one may be small
         sizes = np.where(squares > _NEW**2 * (squares + lost), np.sqrt(squares), 0.0)
         return np.stack([rows, moved]), sizes
 
@@ -312,6 +318,8 @@ class _Span:
             apart = weights > _COPY * weights[-1]
             turned = (turned[:, apart] / np.sqrt(weights[apart])).T
             rows, momenta = turned @ rows, turned @ momenta
+            if weights[0] > weights[-1] / _MUCH:
+                break
         first, last = len(self), len(self) + len(rows)
         forces = products(self._problem.stiffness, rows.T).T
         self._room[:, first:last] = rows, momenta, forces
@@ -358,8 +366,10 @@ class _Span:
             wanted += 1
         return shares[:, :kept], wanted
 
-    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Flags]:
-        """Return what modes leave of their equations, and whether that is no rounding.
+    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Array]:
+        """Return what modes leave of their equations, (m, k), and its relative size (k,).
+
+        The size is zero where all that is left is rounding.
 
         Args:
             shares: Those of all modes, see `modes`.
@@ -369,8 +379,8 @@ class _Span:
         mine, (vectors, momenta, forces) = shares[:, chosen].T, self._parts
         left = mine @ forces - (shares @ along).T @ momenta
         sizes = left, (mine @ vectors) * self._problem.diagonal
-        rest, most = (self._add(np.einsum("kn,kn->k", one, one)) for one in sizes)
-        return left.T, rest > _NOISE**2 * most
+        rest, most = (np.sqrt(self._add(np.einsum("kn,kn->k", one, one))) for one in sizes)
+        return left.T, np.where(rest > _NOISE * most, rest, 0.0) / (most + np.finfo(float).tiny)
 
 
 def _lowest(
@@ -403,23 +413,24 @@ def _lowest(
     """
     block = count + _BESIDE
     span = _started(problem, block, correct, start)
-    errors, past = np.ones(0), np.zeros((0, 0))
+    errors, settled, past = np.ones(0), np.zeros(0), np.zeros((0, 0))
     for _ in range(_MOST_STEPS):
         shares, wanted = span.modes(count, block)
         limits = np.where(np.arange(min(wanted + 1, shares.shape[1])) < wanted, _ACCURATE, _NEXT)
-        if len(errors) != len(limits) or (errors < limits).all():
-            errors = np.ones(len(limits))  # once more of all: modes may have changed places
-        asked = np.flatnonzero(errors >= limits)
-        left, is_some = span.residuals(shares, asked)
-        rows, sizes = span.beside(correct(left))  # in the span modes are the best ones
-        errors[asked] = np.where(is_some, sizes, 0.0)
-        known = len(asked) == len(limits) > wanted and (errors < limits).all()
+        known = len(errors) == len(limits) > wanted and (errors < limits).all()
+        if known:  # modes may have changed places
+            left = span.residuals(shares, np.arange(len(limits)))[1]
+            known = (left <= _GROWN * settled).all()
         if known or len(span) == problem.unknowns:
             return span.combined(shares[:, :wanted])
-        further = (errors >= limits)[asked]
-        rows, sizes = rows[:, further], sizes[further]
-        if len(span) + len(sizes) > _ROOM * block:
+        if len(errors) != len(limits) or (errors < limits).all():
+            errors, settled = np.ones(len(limits)), np.zeros(len(limits))
+        asked = np.flatnonzero(errors >= limits)
+        if len(span) + len(asked) > _ROOM * block:  # first: corrections are beside what is kept
             shares = span.restart(shares, past)
+        left, settled[asked] = span.residuals(shares, asked)
+        rows, sizes = span.beside(correct(left))  # in the span modes are the best ones
+        errors[asked] = np.where(settled[asked] > 0.0, sizes, 0.0)
         span.extend(rows, sizes)
         past = shares
     done = f"{int((errors[:count] < _ACCURATE).sum())} of {count} modes"
