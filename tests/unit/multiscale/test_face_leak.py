@@ -345,7 +345,7 @@ def test_a_face_that_yields_and_wears_is_as_its_sample(box):
             state = slide(model, even, state.start, 3e-8 * slid).state
         flow = gap_flow(state.open_gap, model.surface.lengths, axis=0, periodic=True)
         expected = flow.transmissivity * 4.0 / 6.0 * 0.4 / (12.0 * 1e-8)
-        # hydraulic gaps and closures are linear between depths that double, and between rows
+        # hydraulic gaps and closures are linear in the logarithm of the depth, and between rows
         assert step.leaks[0].rate == pytest.approx(expected, rel=0.1)
         assert step.contact_area_fraction == pytest.approx(state.contact_area_fraction, rel=0.04)
         # the box, free at two sides, is 2 mm high
