@@ -230,37 +230,33 @@ class ContactRecord(Displayed):
 _MAPS = FIELDS[2:]
 
 
-_SHAPE = "shape (n, nx, ny), or (n, nodes) of a reference"
-
-
-def _of_steps(name: str, meaning: str, kind: Any = float) -> Any:
-    """Return a property: a number of all contacts."""
-    return property(
-        lambda history: np.array([getattr(one, name) for one in history.records], kind), doc=meaning
-    )
-
-
-def _map(name: str, meaning: str) -> Any:
-    """Return a property: a map of all contacts, or the places that they have in common."""
-
-    def read(history: ContactHistory) -> Array:
-        found = history.of_records(name)
-        return found if name in _MAPS else found[0]
-
-    return property(read, doc=meaning)
+_OF_STEPS = {"step": np.int64, "approach_mm": float, "force_N": float, "unloading": bool}
+"""Numbers of a contact, and their kinds in arrays."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContactHistory(Displayed, Sequence[ContactRecord]):
     """The contacts of n load steps, one record each; arrays have the load steps as first axis.
 
-    An index gives a record, a slice the contacts of these load steps alone.
+    An index gives a record, a slice the contacts of these load steps alone. Fields of the records
+    are attributes: ``force_N`` has shape (n,), as have ``step``, ``approach_mm`` and ``unloading``;
+    maps such as ``pressure_MPa`` have shape (n, nx, ny), or (n, nodes) of a reference. The places
+    ``x_mm`` and ``y_mm``, which all load steps have in common, have shape (nx,) and (ny,), or those
+    of the nodes.
 
     Attributes:
         records: The contacts, by load step.
     """
 
     records: tuple[ContactRecord, ...]
+
+    def __getattr__(self, name: str) -> Array:
+        if name in _OF_STEPS:
+            return np.array([getattr(one, name) for one in self.records], _OF_STEPS[name])
+        if name not in FIELDS:
+            raise AttributeError(f"'ContactHistory' object has no attribute {name!r}")
+        found = self.of_records(name)
+        return found if name in _MAPS else found[0]
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
@@ -292,20 +288,6 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
             value=step,
             allowed=f"{recorded}; any of a run with output.contact = 'all'",
         )
-
-    step = _of_steps("step", "Numbers of the load steps, shape (n,).", np.int64)
-    approach_mm = _of_steps("approach_mm", "Approaches of the plane, shape (n,) [mm].")
-    force_N = _of_steps("force_N", "Forces of all spots, shape (n,) [N].")
-    unloading = _of_steps("unloading", "Whether the load fell to each load step, shape (n,).", bool)
-    x_mm = _map("x_mm", "Abscissae of the nx cells, shape (nx,), or of a reference's nodes [mm].")
-    y_mm = _map("y_mm", "Ordinates of the ny cells, shape (ny,), or of a reference's nodes [mm].")
-    pressure_MPa = _map("pressure_MPa", f"Contact pressures, {_SHAPE} [MPa].")
-    gap_mm = _map("gap_mm", f"Gaps between plane and deformed surface, {_SHAPE} [mm].")
-    plastic_depth_mm = _map("plastic_depth_mm", f"Plastic depths that loads left, {_SHAPE} [mm].")
-    worn_depth_mm = _map("worn_depth_mm", f"Depths that have worn off, {_SHAPE} [mm].")
-    dissipated_mJ_per_mm2 = _map(
-        "dissipated_mJ_per_mm2", f"Energies lost to friction so far per area, {_SHAPE} [mJ/mm²]."
-    )
 
     @property
     def spots(self) -> tuple[Array, ...]:
@@ -367,7 +349,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         coordinates: dict[str, Any] = {"step": self.step, "spot_step": (("spot",), owner)}
         coordinates |= {
             name: (("step",), getattr(self, name))
-            for name in ("approach_mm", "force_N", "unloading")
+            for name in [*_OF_STEPS][1:]
         }
         maps = [name for name in _MAPS if self.has(name)]
         if maps:
