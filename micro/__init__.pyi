@@ -1,7 +1,9 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
+from .asperities.model import MODEL_NAMES as MODEL_NAMES
 from .asperities.model import MODELS as MODELS
 from .asperities.model import AsperityModel as AsperityModel
+from .asperities.model import micro_model as micro_model
 from .boundary_elements.body_modes import BodyModes as BodyModes
 from .boundary_elements.body_modes import BodyStresses as BodyStresses
 from .boundary_elements.body_modes import TractionModes as TractionModes
@@ -21,8 +23,6 @@ from .boundary_elements.free_sides import FreeSides as FreeSides
 from .boundary_elements.rectangle_fields import RectangleFields as RectangleFields
 from .boundary_elements.side_cells import SideStresses as SideStresses
 from .boundary_elements.side_cells import side_stresses as side_stresses
-from .by_name import MODEL_NAMES as MODEL_NAMES
-from .by_name import micro_model as micro_model
 from .closed_forms import HertzContact as HertzContact
 from .closed_forms import influence_matrix as influence_matrix
 from .friction.friction_model import FrictionModel as FrictionModel

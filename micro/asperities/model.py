@@ -21,7 +21,14 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import Asperities, Control, PatchGrid, RigidPlane
+from patchlaw.geometry import (
+    Asperities,
+    Control,
+    PatchGrid,
+    RigidPlane,
+    Surface,
+    find_asperities,
+)
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.rigid_plane import (
     PlaneLevers,
@@ -41,7 +48,8 @@ from patchlaw.micro.asperities.hertz_pairs import (
 )
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms import checked_modulus, shape_factors
-from patchlaw.micro.model import NormalStiffness, checked_patches
+from patchlaw.micro.half_space.model import HalfSpaceModel
+from patchlaw.micro.model import MicroModel, NormalStiffness, checked_patches
 from patchlaw.support import Array, InputError
 
 T = TypeVar("T")
@@ -204,6 +212,8 @@ class Peaks:
 MODELS = ("elliptic", "circular", "elliptic-independent", "circular-independent")
 """The models (1) to (4) of Waddad et al. 2016, section 2.2: contacts are ellipses, or circles of
 radius sqrt(R' R''), and displace each other's summits through the half-space or not."""
+MODEL_NAMES = (*MODELS, "half-space")
+"""Names of all micro models."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -406,3 +416,22 @@ class AsperityModel:
             f" surface: the model {self.name} of separate summits stands for up to"
             f" {largest:.0%}"
         )
+
+
+def micro_model(name: str, surface: Surface, *, contact_modulus: float) -> MicroModel:
+    """Return the micro model of a surface whose border is free, as that of a block's top is.
+
+    Args:
+        name: A name in `MODEL_NAMES`.
+        surface: The surface.
+        contact_modulus: E* [MPa].
+
+    Raises:
+        InputError: When there is no such model, or the modulus is not positive.
+    """
+    if name == "half-space":
+        return HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
+    if name not in MODELS:
+        raise InputError("unknown micro model", value=name, allowed=", ".join(MODEL_NAMES))
+    asperities = find_asperities(surface)
+    return AsperityModel(name, asperities, contact_modulus=contact_modulus)

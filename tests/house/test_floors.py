@@ -43,10 +43,9 @@ FLOORS = {
         "gap_iteration",
         "transport",
         "boundary_elements model",
-        "asperities complementarity",
+        "complementarity",
         "half_space",
-        "friction wear",
-        "by_name",
+        "asperities friction wear",
     ],
     "macro": [
         "disk_caches",
