@@ -21,7 +21,7 @@ from patchlaw.micro.half_space.error_probe import MOST_CHECKED_CELLS
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import Clock, ClusterNodes, MemoryRequest
+from patchlaw.multiscale.machine import Clock, MemoryRequest
 from patchlaw.multiscale.models import describe, validity
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
@@ -211,7 +211,6 @@ class Coupling(ABC):
         parts: What is known of the scene before its load steps.
         comm: MPI communicator; None for this process alone.
         meshes: The body and the counter-body where these are meshes.
-        nodes: The nodes of the run.
 
     Raises:
         InputError: When something does not lie on the bodies, or does not fit.
@@ -229,9 +228,7 @@ class Coupling(ABC):
         extensions: What is said of laws that load steps needed further.
     """
 
-    def __init__(
-        self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
-    ) -> None:
+    def __init__(self, parts: SceneParts, comm: Any, meshes: Meshes) -> None:
         self.parts, self.comm = parts, comm
         self._meshes = _placed(parts, meshes) if any(meshes) and not parts.samples else meshes
         self.clock = Clock()

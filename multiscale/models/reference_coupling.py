@@ -16,7 +16,7 @@ from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.problem import Model
@@ -209,15 +209,12 @@ class ReferenceCoupling(Coupling):
         rough_meshes: The meshes, from coarse to fine.
     """
 
-    def __init__(
-        self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
-    ) -> None:
-        super().__init__(parts, comm, meshes, nodes)
+    def __init__(self, parts: SceneParts, comm: Any, meshes: Meshes) -> None:
+        super().__init__(parts, comm, meshes)
         compliance = added_compliance(parts, self._meshes[0])
-        nodes = nodes or ClusterNodes()
-        self.rough_meshes = on_root_alone(comm, lambda: self._arranged(compliance, nodes))
+        self.rough_meshes = on_root_alone(comm, lambda: self._arranged(compliance))
 
-    def _arranged(self, compliance: Array, nodes: ClusterNodes) -> ReferenceMeshes:
+    def _arranged(self, compliance: Array) -> ReferenceMeshes:
         """Return the meshes for a body whose face moves by its compliance; on one process."""
         parts, scene = self.parts, self.scene
         surface, plane = parts.surface, parts.plane
@@ -225,10 +222,10 @@ class ReferenceCoupling(Coupling):
         if parts.path.quantity == "approach":  # the plane under a force stays as it is
             model, turns = HalfSpaceModel(surface, contact_modulus=modulus), scene.loading.tilt
             plane = plane_over_face(plane, model, compliance, turns=turns == "free")
-        check_memory(nodes, least_requests(scene, surface, plane))
+        check_memory(parts.nodes, least_requests(scene, surface, plane))
         contact = contact_under(plane, surface, modulus)
         found = reference_meshes(scene, surface, parts.body, plane, contact)
-        check_memory(nodes, found.requests(scene))
+        check_memory(parts.nodes, found.requests(scene))
         return found
 
     # --- what is said of it

@@ -27,7 +27,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.laws.worn_laws import WornLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
@@ -62,10 +62,8 @@ class RepresentativeCoupling(Coupling):
         extensions: What is said of laws that load steps needed further.
     """
 
-    def __init__(
-        self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
-    ) -> None:
-        super().__init__(parts, comm, meshes, nodes)
+    def __init__(self, parts: SceneParts, comm: Any, meshes: Meshes) -> None:
+        super().__init__(parts, comm, meshes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
         self._elsewhere: dict[str, tuple[Any, Any, Any]] = {}
         if meshes[1] is not None:

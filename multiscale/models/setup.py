@@ -43,6 +43,7 @@ def scene_parts(scene: Scene, facts: Facts, nodes: ClusterNodes) -> SceneParts:
     check_memory(nodes, scene_requests(scene))
     made = _of_samples(scene, facts) if scene.law.representative else _of_surface(scene, facts)
     made.check_slopes()
+    made.nodes = nodes
     return made
 
 
@@ -193,5 +194,5 @@ def trial_coupling(
         facts = first.facts if first else None, counter.facts if counter else None
         parts = on_root_alone(large_object_comm(comm), lambda: scene_parts(scene, facts, nodes))
         kind = getattr(import_module(f"patchlaw.multiscale.models.{module}"), name)
-        made: Coupling = kind(parts, comm, meshes, nodes)
+        made: Coupling = kind(parts, comm, meshes)
         return made

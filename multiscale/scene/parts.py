@@ -31,6 +31,7 @@ from patchlaw.geometry.statistics import check_finite_slopes
 from patchlaw.geometry.surface import Zero
 from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
+from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
@@ -197,6 +198,7 @@ class SceneParts:
             the load steps needs it. Under laws of samples it is that on the first sample, an upper
             bound, as the body takes part of the approach.
         seconds: Wall time of each part of making it [s].
+        nodes: The nodes of the run.
     """
 
     scene: Scene
@@ -214,6 +216,7 @@ class SceneParts:
     finite_slopes: bool = False
     plane_at_largest_load: RigidPlane | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+    nodes: ClusterNodes = field(default_factory=ClusterNodes)
 
     def check_slopes(self) -> None:
         """Refuse finite slopes of surfaces that are too steep for them.
