@@ -17,7 +17,7 @@ import numpy as np
 
 from patchlaw.support import PROGRAM, InputError, address_space, node_cores, physical_memory
 from patchlaw.support.packages import away
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""
@@ -349,12 +349,12 @@ class Clock:
 
     Attributes:
         seconds: Wall time of each phase that ended [s].
-        observe: Told what the run is at; None without anybody to tell.
+        observe: Told what the run is at.
     """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self.observe: ProgressObserver | None = None
+        self.observe: ProgressObserver = unobserved
         self._began = self._until = time.perf_counter()
 
     def add(self, seconds: Mapping[str, float]) -> None:
@@ -367,9 +367,8 @@ class Clock:
         self._until = time.perf_counter()
 
     def tell(self, what: str, done: int = 0, most: int = 0) -> None:
-        """Tell the observer, if there is one, what the run is at; see `ProgressObserver`."""
-        if self.observe is not None:
-            self.observe(what, done, most)
+        """Tell the observer what the run is at; see `ProgressObserver`."""
+        self.observe(what, done, most)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

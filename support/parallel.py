@@ -346,7 +346,7 @@ def shared(
     work: Callable[[int], T],
     *,
     costs: Sequence[float] | None = None,
-    observe: Callable[[int], None] | None = None,
+    observe: Callable[[int], object] = bool,
 ) -> list[T]:
     """Do tasks of a list on all ranks; a single one on rank 0 with all cores of its node.
 
@@ -375,8 +375,7 @@ def shared(
         results = []
         for turn, index in enumerate(parts[rank]):
             results.append(work(index))
-            if observe is not None:
-                observe(min(size * (turn + 1), count))
+            observe(min(size * (turn + 1), count))
         return results
 
     if size == 1:

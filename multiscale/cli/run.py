@@ -46,7 +46,7 @@ from patchlaw.support.errors import InputError, NotConverged, NotInstalled, Patc
 from patchlaw.support.files import OwnFiles
 from patchlaw.support.packages import optional_packages
 from patchlaw.support.parallel import on_root, on_root_alone, place_in
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -213,7 +213,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     console.show_plan(comm, coupling, needed, shortages)
 
 
-def planned(scene: Scene, comm: Any, observe: ProgressObserver | None = None) -> Coupling:
+def planned(scene: Scene, comm: Any, observe: ProgressObserver = unobserved) -> Coupling:
     """Make the coupling of a scene, as if these nodes had any memory that it may take.
 
     Args:

@@ -24,7 +24,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, Refined, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.support import Array, on_root_alone, shared
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
@@ -74,7 +74,7 @@ def consistent_laws(
     tolerance: float = 2e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: ProgressObserver | None = None,
+    observe: ProgressObserver = unobserved,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
@@ -116,7 +116,7 @@ def consistent_laws(
         displacements=displacements or (lambda pressures: pressures @ compliance.T),
         tilt=largest.tilt,
         comm=comm,
-        observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
+        observe=lambda rows: observe("rows of laws", rows, most_rows),
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
@@ -170,7 +170,7 @@ class WholeSurface:
     displacements: Displacements
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
-    observe: Callable[[int], None] | None = None
+    observe: Callable[[int], None] = lambda rows: None
     quick: bool = False
     _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
     _starts: dict[float, Start] = field(default_factory=dict, init=False)
@@ -277,8 +277,7 @@ class WholeSurface:
             return [state.summary() for state in states]
 
         def solved(done: int) -> None:
-            if self.observe is not None:
-                self.observe(len(self._solved) + min(count * done, len(approaches)))
+            self.observe(len(self._solved) + min(count * done, len(approaches)))
 
         first = min(float(approaches[0]), 0.0)
         costs = [float(np.sum(part - first)) for part in parts]  # the nearer, the dearer
@@ -401,7 +400,7 @@ def isolated_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: ProgressObserver | None = None,
+    observe: ProgressObserver = unobserved,
 ) -> LawTable:
     """Tabulate the isolated laws of all patches.
 
@@ -438,8 +437,10 @@ def isolated_laws(
         )
         return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
-    watch = (lambda done: observe("laws of patches", done, count)) if observe else None
-    laws = tuple(shared(comm, count, make, costs=costs, observe=watch))
+    def made(done: int) -> None:
+        observe("laws of patches", done, count)
+
+    laws = tuple(shared(comm, count, make, costs=costs, observe=made))
     return LawTable(
         patches=patches,
         laws=laws,

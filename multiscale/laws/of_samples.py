@@ -26,7 +26,7 @@ from patchlaw.multiscale.laws.refinement import MOST_ROWS, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support import Array, InputError, shared
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 T = TypeVar("T", float, Array)
 MakeModel = Callable[[Surface], HalfSpaceModel]
@@ -69,7 +69,7 @@ def representative_law(
     before: PatchLaw | None = None,
     leak: bool = False,
     comm: Comm | None = None,
-    observe: ProgressObserver | None = None,
+    observe: ProgressObserver = unobserved,
 ) -> PatchLaw:
     """Tabulate the law of a face that is much larger than the samples of its roughness.
 
@@ -126,7 +126,7 @@ def representative_law(
     face = PeriodicSamples(
         samples=tuple(_checked(sample, make, _ROW_ERROR * tolerance) for sample in samples),
         comm=comm,
-        observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
+        observe=lambda rows: observe("rows of laws", rows, most_rows),
     )
     law = face.law(pressure, closure, tolerance, most_rows, before)
     return face.with_leak(law, before) if leak else law
@@ -215,7 +215,7 @@ class PeriodicSamples:
 
     samples: tuple[PeriodicSample, ...]
     comm: Any = None
-    observe: Callable[[int], None] | None = None
+    observe: Callable[[int], None] = lambda rows: None
     _solved: list[int] = field(default_factory=lambda: [0], init=False)
 
     @property
@@ -414,8 +414,7 @@ class PeriodicSamples:
             return self.samples[sample].rows(parts[part], within[sample])
 
         def solved(done: int) -> None:
-            if self.observe is not None:
-                self.observe(self._solved[0] + done * len(separations) // tasks)
+            self.observe(self._solved[0] + done * len(separations) // tasks)
 
         nearer = [self.first_touch - float(part.mean()) for part in parts]  # and so dearer
         found = shared(self.comm, tasks, solve, costs=nearer * len(self.samples), observe=solved)

@@ -330,11 +330,11 @@ class Coupling(ABC):
         self.scene.check_has_laws()
         if self.table is None:
             with self.clock.phase("laws"):
-                made = self._make_table(self.clock.observe)
+                made = self._make_table(self.clock.tell)
                 self.table = made.with_stiffness_ratios(self._stiffness_ratios())
         return self.table
 
-    def _make_table(self, observe: ProgressObserver | None) -> LawTable:
+    def _make_table(self, observe: ProgressObserver) -> LawTable:
         """Tabulate the laws; collective."""
         raise NotImplementedError
 

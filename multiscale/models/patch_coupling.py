@@ -28,7 +28,7 @@ from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import PatchContact, PathContact
 from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
 from patchlaw.support import Array, on_root, on_root_alone
-from patchlaw.support.readable import ProgressObserver, times
+from patchlaw.support.readable import ProgressObserver, times, unobserved
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
@@ -110,7 +110,7 @@ class PatchCoupling(CellCoupling):
             self._model = self.model_on_body()  # in a phase of its own
         return super().make_laws()
 
-    def _make_table(self, observe: ProgressObserver | None) -> LawTable:
+    def _make_table(self, observe: ProgressObserver) -> LawTable:
         options = self._options(observe)
         if self.scene.patches_alone:
             ends, love = self.parts.largest_closures + self._rise(), self.scene.coupling.love
@@ -119,7 +119,7 @@ class PatchCoupling(CellCoupling):
         table = self._consistent(self._model, self._largest_control(), **options)
         return self._with_leak(table, self._model, None, self._largest_control())
 
-    def _options(self, observe: ProgressObserver | None) -> dict[str, Any]:
+    def _options(self, observe: ProgressObserver = unobserved) -> dict[str, Any]:
         return {
             "mean_heights": self.parts.mean_heights,
             "tolerance": self.table_tolerance,
@@ -194,7 +194,7 @@ class PatchCoupling(CellCoupling):
         load = Control(force=self._largest_force, tilt=tilt)
         for slid, depth, wear, _ in self.worn_depths:
             means, lower = (field_means(one, lengths, parts.patches) for one in (wear, depth))
-            options = self._options(None) | {"mean_heights": parts.mean_heights - lower}
+            options = self._options() | {"mean_heights": parts.mean_heights - lower}
             model = self._worn_model(depth)
             made = self._with_leak(self._consistent(model, load, **options), model, depth, load)
             laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))

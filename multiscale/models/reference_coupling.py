@@ -32,7 +32,7 @@ from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support import Array, located, on_root_alone
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape
@@ -76,7 +76,7 @@ class MeshedContact(Model):
         self,
         meshes: Sequence[RoughMesh],
         patches: PatchGrid,
-        observe: ProgressObserver | None = None,
+        observe: ProgressObserver = unobserved,
     ) -> None:
         self.meshes, self._patches, self._observe = meshes, patches, observe
         self._last: tuple[FaceEquilibrium, ...] = ()
@@ -96,8 +96,7 @@ class MeshedContact(Model):
         states = []
         for done, one in enumerate(self.meshes, 1):
             states.append(one.problem.solve(control))
-            if self._observe is not None:
-                self._observe("meshes pressed", done, len(self.meshes))
+            self._observe("meshes pressed", done, len(self.meshes))
         self._last = tuple(states)
         patches = self._patches
         finest, nominal = states[-1], patches.area * patches.count

@@ -43,7 +43,7 @@ from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth
 from patchlaw.support import Array, located, shared
-from patchlaw.support.readable import ProgressObserver, number, times
+from patchlaw.support.readable import ProgressObserver, number, times, unobserved
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
@@ -186,7 +186,7 @@ class RepresentativeCoupling(Coupling):
     # --- laws and load steps
 
     def _make_table(
-        self, observe: ProgressObserver | None, before: LawTable | None = None
+        self, observe: ProgressObserver = unobserved, before: LawTable | None = None
     ) -> LawTable:
         """Tabulate the laws, or extend earlier ones as far as the material allows.
 
@@ -414,7 +414,7 @@ class RepresentativeCoupling(Coupling):
     def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face
         if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
-            new = self._make_table(None)
+            new = self._make_table()
             table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())
         problem_of = partial(self._problem, face)
         made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
@@ -438,7 +438,7 @@ class RepresentativeCoupling(Coupling):
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""
-        longer = self._make_table(None, before=table)
+        longer = self._make_table(before=table)
         if longer is table:
             return None
         self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())

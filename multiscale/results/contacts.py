@@ -347,10 +347,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         columns = zip(names, rows.T, strict=True)
         values: dict[str, Any] = {name: (("spot",), column) for name, column in columns}
         coordinates: dict[str, Any] = {"step": self.step, "spot_step": (("spot",), owner)}
-        coordinates |= {
-            name: (("step",), getattr(self, name))
-            for name in [*_OF_STEPS][1:]
-        }
+        coordinates |= {name: (("step",), getattr(self, name)) for name in [*_OF_STEPS][1:]}
         maps = [name for name in _MAPS if self.has(name)]
         if maps:
             on_cells = getattr(self, maps[0]).ndim == 3

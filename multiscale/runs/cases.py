@@ -110,7 +110,7 @@ def run_cases(
     comm: Any = None,
     *,
     part: tuple[int, int] = (1, 1),
-    observe: Callable[[Any, CaseResult], None] | None = None,
+    observe: Callable[[Any, CaseResult], object] = lambda case, result: None,
 ) -> dict[int, CaseResult]:
     """Run the cases of a study that are not done yet.
 
@@ -146,8 +146,7 @@ def run_cases(
                 if result.status in REPEATABLE:
                     store(result)
                 mine[ahead[task]] = result
-                if observe is not None:
-                    observe(case, result)
+                observe(case, result)
 
         try:
             together(comm, work)

@@ -236,8 +236,8 @@ def compare(
     *,
     against: str | None = None,
     folder: str | Path | None = None,
-    observe: Callable[[Configuration, CaseResult], None] | None = None,
-    begun: Callable[[Configuration], None] | None = None,
+    observe: Callable[[Configuration, CaseResult], object] = lambda one, result: None,
+    begun: Callable[[Configuration], object] = lambda one: None,
 ) -> Comparison:
     """Run a scene in every sensible configuration, as a sweep runs its cases.
 
@@ -283,8 +283,7 @@ def compare(
     scene, ways = on_root(comm, chosen)
 
     def solve(one: Configuration, progress: Callable[[], None]) -> CaseResult:
-        if begun is not None:
-            begun(one)
+        begun(one)
         return solved(one, progress)
 
     results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe)

@@ -41,7 +41,7 @@ from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.support import on_root_alone
-from patchlaw.support.readable import ProgressObserver, times
+from patchlaw.support.readable import ProgressObserver, times, unobserved
 
 MOST_HEIGHTS = 2048
 """Heights or cells along a side of grids that are chosen, at most."""
@@ -156,7 +156,7 @@ class Search:
     nodes: ClusterNodes
     read: Callable[[Scene, Any], Meshes]
     mesh_error: Callable[[ReferenceCoupling], float]
-    observe: ProgressObserver = lambda what, done, most: None
+    observe: ProgressObserver = unobserved
     tally: Counter[str] = field(default_factory=Counter)
 
     def build(self, scene: Scene) -> Coupling:

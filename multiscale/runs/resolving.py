@@ -27,6 +27,7 @@ from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import flat, to_dict
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support import Comm, InputError, NotConverged, checked, located, on_root_alone
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
     from patchlaw.multiscale.runs.refining import Found, Search
@@ -44,7 +45,7 @@ def resolve(
     nodes: ClusterNodes | None = None,
     read: Callable[[Scene, Any], Meshes] | None = None,
     mesh_error: Callable[[Any], float] | None = None,
-    observe: Callable[[str, int, int], None] | None = None,
+    observe: ProgressObserver = unobserved,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
 
@@ -78,7 +79,7 @@ def resolve(
         nodes=nodes or ClusterNodes(),
         read=read or BodyReader(),
         mesh_error=mesh_error or measured_mesh_error,
-        observe=observe or (lambda what, done, most: None),
+        observe=observe,
     )
     unmeasured = {"patches.grid"} if scene.law.representative else {"patches.grid", "block.cells"}
     with located(scene.file):

@@ -31,7 +31,7 @@ from patchlaw.multiscale.runs.resolving import chosen_keys, resolve
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.support import Comm, NotConverged, checked, on_root
 from patchlaw.support.packages import optional_packages
-from patchlaw.support.readable import ProgressObserver
+from patchlaw.support.readable import ProgressObserver, unobserved
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
@@ -164,7 +164,7 @@ class Run:
         scene: Scene,
         comm: Comm | None = None,
         stated: Scene | None = None,
-        observe: ProgressObserver | None = None,
+        observe: ProgressObserver = unobserved,
     ) -> None:
         self.clock = Clock()
         self.clock.observe = observe
@@ -347,7 +347,9 @@ def run(
     Note:
         Collective.
     """
-    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
+    with (
+        run_progress(comm, scene.loading) if progress else nullcontext((None, unobserved)) as shown
+    ):
         advance, at = shown
         whole = Run(scene, comm, observe=at)
         try:

@@ -89,5 +89,5 @@ def test_laws_in_full_contact_go_on():
     table = coupling.make_laws()
     (law,) = table.laws
     assert law.rows.closure[-1] > law.initial_separation  # full contact is behind it
-    (longer,) = coupling._make_table(None, before=table).laws
+    (longer,) = coupling._make_table(before=table).laws
     assert longer.rows.pressure[-1] == pytest.approx(2.0 * law.rows.pressure[-1], rel=1e-3)
