@@ -267,9 +267,7 @@ def _membrane(heights: Array, missing: Flags, spacing: tuple[float, float]) -> A
     row, column, count = number.ravel()[cell], number.ravel()[other], int(missing.sum())
     inside = column >= 0
     right = np.bincount(
-        row[~inside],
-        weights=weight[~inside] * heights.ravel()[other[~inside]],
-        minlength=count,
+        row[~inside], weights=weight[~inside] * heights.ravel()[other[~inside]], minlength=count
     )
     diagonal = np.bincount(row, weights=weight, minlength=count)
     entries = np.concatenate((-weight[inside], diagonal))
@@ -282,11 +280,7 @@ def _membrane(heights: Array, missing: Flags, spacing: tuple[float, float]) -> A
 
 
 def regridded(
-    heights: Array,
-    lengths: tuple[float, float],
-    grid: tuple[int, int],
-    *,
-    periodic: bool = False,
+    heights: Array, lengths: tuple[float, float], grid: tuple[int, int], *, periodic: bool = False
 ) -> Array:
     """Return heights on another grid of the same rectangle.
 

@@ -96,10 +96,7 @@ class SliderRecord:
         Args:
             comm: MPI communicator.
         """
-        own = (
-            {"place": self.place, "stress": self.stress, "path": self.path},
-            vars(self.sliders),
-        )
+        own = ({"place": self.place, "stress": self.stress, "path": self.path}, vars(self.sliders))
         every = comm.allgather(own)
         samples, sliders = (
             {name: np.concatenate([rank[i][name] for rank in every]) for name in own[i]}
@@ -167,11 +164,7 @@ class Sliders:
     """
 
     def __init__(
-        self,
-        beds: Sequence[SpringBed],
-        ratios: Array,
-        patch: Indices,
-        coefficient: float | Array,
+        self, beds: Sequence[SpringBed], ratios: Array, patch: Indices, coefficient: float | Array
     ) -> None:
         self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch

@@ -127,10 +127,7 @@ def _compiling() -> Iterator[dict[str, dict[str, Any]]]:
 
 @quiet_compiler()
 def mesh_from_cells(
-    cells: Counts,
-    points: Array,
-    neighbours: tuple[Counts, Counts] | None,
-    comm: Any,
+    cells: Counts, points: Array, neighbours: tuple[Counts, Counts] | None, comm: Any
 ) -> Any:
     """Make a mesh of hexahedra or tetrahedra, straight or of second order, or a plane one.
 

@@ -584,11 +584,7 @@ _DECAYED = 20.0
 
 
 def stresses_below(
-    pressure: Array,
-    spacing: tuple[float, float],
-    poisson_ratio: float,
-    depths: Array,
-    row: int,
+    pressure: Array, spacing: tuple[float, float], poisson_ratio: float, depths: Array, row: int
 ) -> Array:
     """Return the stresses below one row of cells of a half-space.
 

@@ -31,11 +31,7 @@ from patchlaw.geometry.preparation import Preparation, WorkingMap, prepared_map
 from patchlaw.geometry.statistics import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.surface import Surface
 from patchlaw.support import Grid, InputError, Lengths, checked
-from patchlaw.support.checks import (
-    check_file,
-    reading,
-    real_array,
-)
+from patchlaw.support.checks import check_file, reading, real_array
 
 _READ_OF = {".x3p": "; of .x3p it reads ISO 5436-2 in binary form and of one layer"}
 """What the readers know of a format, by how names of its files end."""

@@ -398,11 +398,7 @@ def suggested_fine(
 
 
 def places_in_reach(
-    surface: Surface,
-    approach: float,
-    *,
-    spacing: float,
-    tilt: tuple[float, float] = (0.0, 0.0),
+    surface: Surface, approach: float, *, spacing: float, tilt: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
     """Return the places that the plane can touch: where the undeformed surface interferes with it.
 

@@ -392,11 +392,7 @@ class LoadedFace(ContactFace):
 
 
 def directed_rows(
-    weights: Array,
-    columns: Counts,
-    used: Flags,
-    directions: Array,
-    unknowns: int,
+    weights: Array, columns: Counts, used: Flags, directions: Array, unknowns: int
 ) -> csr_matrix:
     """Return w φ d for the displacements of every node, shape (k points, unknowns) [mm²].
 

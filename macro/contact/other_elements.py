@@ -175,10 +175,7 @@ def _tags_of(body: MeshedBody, facets: ContactFacets) -> Locals:
 
 
 def start_from_elements(
-    problem: LawContactProblem,
-    known: FaceEquilibrium,
-    before: ContactFace,
-    body_state: float = 0.0,
+    problem: LawContactProblem, known: FaceEquilibrium, before: ContactFace, body_state: float = 0.0
 ) -> None:
     """Take the solution on some elements for the latest one of a problem on others.
 

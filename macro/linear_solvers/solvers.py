@@ -262,10 +262,7 @@ class LinearSolver(PETSc.KSP):
         return str((self._inner or self.pc).getType())
 
     def solve_slow_modes(
-        self,
-        grid: PETSc.KSP,
-        matrix: PETSc.Mat | None = None,
-        modes: Array | None = None,
+        self, grid: PETSc.KSP, matrix: PETSc.Mat | None = None, modes: Array | None = None
     ) -> None:
         """Solve for modes that the preconditioner of a grid misses; see `slow_modes`.
 

@@ -11,13 +11,7 @@ from mpi4py import MPI
 
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import on_all_ranks
-from patchlaw.macro.mesh.tagged import (
-    TaggedMesh,
-    cell_tags,
-    facet_tags,
-    marked_sides,
-    named_groups,
-)
+from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides, named_groups
 from patchlaw.support import Counts, InputError
 
 

@@ -297,9 +297,7 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     return corners, areas * np.where(away < 0.0, -1.0, 1.0)[:, None], inner
 
 
-def marked_sides(
-    tagged: TaggedMesh,
-) -> Iterator[tuple[Indices, Indices, Locals]]:
+def marked_sides(tagged: TaggedMesh) -> Iterator[tuple[Indices, Indices, Locals]]:
     """Yield this rank's cells with a marked facet, one side of the reference cell after the other.
 
     Args:

@@ -21,14 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import (
-    Asperities,
-    Control,
-    PatchGrid,
-    RigidPlane,
-    Surface,
-    find_asperities,
-)
+from patchlaw.geometry import Asperities, Control, PatchGrid, RigidPlane, Surface, find_asperities
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.rigid_plane import (
     PlaneLevers,

@@ -28,11 +28,7 @@ from patchlaw.micro.friction.stick_slip import (
     across,
     solve_tractions,
 )
-from patchlaw.micro.friction.tangential_grid import (
-    CrossCompliance,
-    Pair,
-    TangentialGrid,
-)
+from patchlaw.micro.friction.tangential_grid import CrossCompliance, Pair, TangentialGrid
 from patchlaw.support import Array, Flags, InputError, Limits, Positive, blas_threads, check_fields
 
 _RESIDUAL, _FORCING = 3e-4, 1e-2

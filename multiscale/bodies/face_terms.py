@@ -37,13 +37,7 @@ from patchlaw.micro import (
 )
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.support import Array, InputError, process_memory
-from patchlaw.support.arguments import (
-    Comm,
-    Distance,
-    PositiveLength,
-    check_fields,
-    checked,
-)
+from patchlaw.support.arguments import Comm, Distance, PositiveLength, check_fields, checked
 
 if TYPE_CHECKING:
     from patchlaw.macro import ContactFacets, FaceCompliance, MeshedBody

@@ -269,11 +269,7 @@ class _Reader:
                 yield tag, strain
 
     def _facts(
-        self,
-        body: MeshedBody,
-        face: PlanarFace,
-        facets: Sequence[ContactFacets],
-        note: str | None,
+        self, body: MeshedBody, face: PlanarFace, facets: Sequence[ContactFacets], note: str | None
     ) -> BodyFacts:
         """Return what is known of the body without its mesh."""
         lowest, highest = self._extent(body.mesh, face.frame)
@@ -365,9 +361,7 @@ class _Reader:
             )
 
 
-def _components(
-    stated: Sequence[float | str],
-) -> tuple[float | None, float | None, float | None]:
+def _components(stated: Sequence[float | str]) -> tuple[float | None, float | None, float | None]:
     x, y, z = (None if isinstance(one, str) else one for one in stated)
     return x, y, z
 

@@ -292,10 +292,7 @@ class CellContact(Model):
         state = self.latest
         if state is None or state.pressure is None:
             return {}
-        columns = {
-            "elastic_energy_mJ": state.elastic_energy,
-            "plastic_work_mJ": state.plastic_work,
-        }
+        columns = {"elastic_energy_mJ": state.elastic_energy, "plastic_work_mJ": state.plastic_work}
         if state.plastic_depth is not None and state.yielding is not None:
             columns["yielding_area_fraction"] = float(np.mean(state.yielding))
             columns["plastic_depth_mm"] = float(state.plastic_depth.max())

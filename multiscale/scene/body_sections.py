@@ -223,9 +223,7 @@ class CounterBodySection(BodyLoads):
         if self.young_modulus is None or self.poisson_ratio is None:
             return None
         return Material(
-            young_modulus=self.young_modulus,
-            poisson_ratio=self.poisson_ratio,
-            density=self.density,
+            young_modulus=self.young_modulus, poisson_ratio=self.poisson_ratio, density=self.density
         )
 
 

@@ -76,11 +76,7 @@ class MicroSection:
     """
 
     model: Literal[
-        "elliptic",
-        "circular",
-        "elliptic-independent",
-        "circular-independent",
-        "half-space",
+        "elliptic", "circular", "elliptic-independent", "circular-independent", "half-space"
     ] = "half-space"
     finite_slopes: bool | None = None
     cells: tuple[Heights, Heights] | None = None

@@ -158,11 +158,7 @@ def load_viewer() -> None:
 
 
 def _chosen(
-    folder: Path,
-    shown: Sequence[str],
-    step: int | None,
-    mode: int | None,
-    most: int | None = None,
+    folder: Path, shown: Sequence[str], step: int | None, mode: int | None, most: int | None = None
 ) -> list[tuple[str, Callable[[], _Drawn]]]:
     """Return what draws what is to be shown, or what results have, the first of it at most."""
     load_viewer()
