@@ -21,7 +21,7 @@ import numpy as np
 from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from patchlaw.micro.half_space.error_probe import OnBody
-from patchlaw.multiscale.bodies.face_terms import ElasticBlock, FaceTerms, mesh_term
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term, mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support import Array, Indices
@@ -122,9 +122,9 @@ class Bodies:
             first = mesh_term(self.first, lengths, side_term=side_term)
         else:
             assert shape is not None
-            size: Any = {"height": shape.height, "sides": block_section(parts.scene).sides}
-            block = ElasticBlock(parts.materials.first, **size, margin=shape.margin)
-            (first,) = block.terms(shape.interface, side_term=side_term).bodies
+            material, sides = parts.materials.first, block_section(parts.scene).sides
+            own = block_sides(shape, material, sides) if side_term else None
+            first = block_term(shape, material, sides, own)
         if self.counter is None:
             return FaceTerms((first,))
         second = mesh_term(self.counter, lengths, side_term=False, opposite=first)

@@ -305,6 +305,19 @@ def resolving_modes(lengths: tuple[float, float], depth: float, least: int) -> i
     return math.ceil(round(count, 6))
 
 
+def block_sides(shape: BlockShape, material: Material, sides: Sides) -> FreeSides | None:
+    """Return the sides of a block as a term of their own; None where they do not bound the contact.
+
+    Args:
+        shape: Size of the block, with the contact as its interface.
+        material: Elastic constants.
+        sides: Support of its sides.
+    """
+    if sides != "free" or shape.margin:
+        return None
+    return free_sides(shape.interface, material, shape.height)
+
+
 def block_term(
     shape: BlockShape, material: Material, sides: Sides, side_term: FreeSides | None = None
 ) -> FiniteBody:
@@ -413,9 +426,7 @@ class ElasticBlock:
         shape = BlockShape(
             interface=lengths, height=self.height, cells=_ANY_CELLS, margin=self.margin
         )
-        own = None
-        if side_term and self.sides == "free" and not self.margin:
-            own = free_sides(lengths, self.material, self.height)
+        own = block_sides(shape, self.material, self.sides) if side_term else None
         return FaceTerms((block_term(shape, self.material, self.sides, own),))
 
     @checked
