@@ -1,5 +1,7 @@
 """Tables as text and HTML; what shows itself does so in a shell, printed and in a notebook."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,10 @@ def test_contacts_and_fields_say_what_they_are():
     line, rows = rows_and_line(both)
     assert line == "ContactHistory of 2 load steps" and rows[1]["spots"] == "25"
     assert isinstance(both[1:], ContactHistory) and both[1:].force_N.tolist() == [50.0]
+    slips = replace(record, slipping=np.eye(2, dtype=bool))
+    assert ContactHistory(records=(slips, slips)).slipping.shape == (2, 2, 2)
+    with pytest.raises(AttributeError, match="no attribute 'slips'"):
+        _ = both.slips
     fields = BodyFields(
         step=np.array([3]), points_mm=np.eye(4, 3), cells=np.array([[0, 1, 2, 3]]),
         cell_type="Tetrahedron", displacement_mm=np.ones((1, 4, 3)),
