@@ -29,7 +29,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.transport import GapFlow, cell_network, gap_flows, widened_gap
+from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.transport import GapFlow, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
 from patchlaw.multiscale.laws.transmissivity import ROUGH, error_of_grid, next_to_closing
 from patchlaw.multiscale.loading.column import WAYS, Leak
