@@ -91,15 +91,15 @@ def test_the_error_is_that_of_coarser_grids_and_next_to_closing_of_wider_gaps():
             leak = step.leak(way)
             own, half, quarter = (abs(one.leak(way).rate) for one in (step, *fewer))
             closing = min(own, half, quarter) == 0.0 or not 1 / 3 < own / half < 3.0
-            expected = 0.02 * own
-            for first, second, power in ((own, half, 1.0), (half, quarter, 0.75)):
-                if min(first, second) > 0.0:
-                    factor = max(first / second, second / first) ** power
-                    expected = max(expected, own * (factor - 1.0))
-            if closing:  # no coarser grid tells by how much it falls
+            own_gap, half_gap, quarter_gap = np.cbrt([own, half, quarter])
+            change = abs(own_gap - half_gap)
+            if closing:  # coarser grids tell less than wider gaps
                 wider = gap_flow(wide, (1.0, 1.5), axis=axis, periodic=True)
-                most = abs(wider.rate(0.1, 1e-9)) - own
-                expected = max(expected, most, 2.0 * max(own, half))
+                grown = np.cbrt(abs(wider.rate(0.1, 1e-9))) - own_gap
+                off = max(0.4 * change, 0.6 * grown, 0.05 * max(own_gap, half_gap))
+            else:
+                off = max(1.2 * change, 0.25 * abs(half_gap - quarter_gap), 0.01 * own_gap)
+            expected = (own_gap + off) ** 3 - own
             assert leak.error == pytest.approx(expected, rel=1e-4)
             kinds.add((closing, own > 0.0))
     assert kinds >= {(False, True), (True, True)}
