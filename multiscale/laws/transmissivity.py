@@ -2,7 +2,7 @@
 
 Each row is solved on the cells of the surface and on half and a quarter as many a side, whose
 differences are the error of the grid. Next to closing they tell little of it, and what flows where
-contact ends half a cell earlier bounds it.
+contact ends half a cell earlier tells more.
 
 Theory: docs/theory.md, section 16.
 """
@@ -48,12 +48,12 @@ ROUGH = 1e-4
 """Error of flows that does no harm where they tell an error, or lie in a table whose rows tell them
 to some 10⁻³."""
 _HALF, _QUARTER, _LEAST = 1.2, 0.25, 0.01
-"""Parts that the error of a hydraulic gap is at least: of its change from half as many cells a side,
-and from a quarter to half as many, as either change may vanish by chance; of the gap itself."""
+"""Parts that the error of a hydraulic gap is at least: of its change from half as many cells a
+side, and from a quarter to half as many, as either may vanish by chance; of the gap itself."""
 _APART, _CLOSING, _WIDER, _ENDS = 3.0, 0.4, 0.6, 0.05
 """Next to closing, that is where one of these grids is closed, or a flow and that on half as many
-cells differ by a factor of 3, the same: of the change from half as many cells; of what the hydraulic
-gap grows by as contact ends half a cell earlier; and of the larger gap of both grids."""
+cells differ by a factor of 3, the same: of the change from half as many; of what the hydraulic gap
+grows by as contact ends half a cell earlier; and of the larger one on both grids."""
 
 
 def error_of_grid(

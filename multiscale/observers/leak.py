@@ -3,8 +3,7 @@
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them. Next to closing it is what the leak grows by as contact ends half a cell earlier; see
-`multiscale.laws.transmissivity.error_of_grid`.
+them. Next to closing wider gaps tell it; see `multiscale.laws.transmissivity.error_of_grid`.
 
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
