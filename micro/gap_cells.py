@@ -104,7 +104,7 @@ def joined_pools(pools: Numbers, count: int, axis: int) -> Numbers:
         axis: Axis along which the map continues over its sides.
     """
     pairs = np.stack([pools.take(0, axis), pools.take(-1, axis)])
-    pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
-    found = 1 + joined(pairs[0], pairs[1], count + 1)
+    tail, head = pairs[:, pairs.all(axis=0)]
+    found = 1 + joined(tail, head, count + 1)
     found[0] = 0
     return found
