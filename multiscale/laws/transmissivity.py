@@ -109,7 +109,7 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
 _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
-_OFF, _MOST, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 0.5, 8e-3, 8
+_OFF, _MOST, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 0.75, 8e-3, 8
 """Rows are added on both sides of one whose T those beside it miss by more than the third part of
 the error of the grid, but no less than the first and no more than the second part of T, until they
 are as near as this part of the separation at first touch, in so many passes at most. Ten samples,
