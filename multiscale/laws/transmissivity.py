@@ -86,13 +86,6 @@ def error_of_grid(
     return np.asarray((own + error) ** 3 - own**3)
 
 
-def _apart(first: Array, second: Array) -> Array:
-    """Return the factors between flows, 1 where one of two is closed."""
-    both = (first > 0.0) & (second > 0.0)
-    ratio = np.divide(first, second, out=np.ones(np.shape(both)), where=both)
-    return np.maximum(ratio, 1.0 / ratio)
-
-
 def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Flags:
     """Return which flows are so near to closing that coarser grids do not tell their error.
 
@@ -103,7 +96,7 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
     """
     own, half, quarter = map(np.abs, (flow, half, quarter))
     closed = (own == 0.0) | (half == 0.0) | (quarter == 0.0)
-    return np.asarray(closed | (_apart(own, half) > _APART))
+    return np.asarray(closed | (own > _APART * half) | (half > _APART * own))
 
 
 _ROWS = 7

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.gap_cells import cell_network, turned
 from patchlaw.micro.transport import GapFlow, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
 from patchlaw.multiscale.laws.transmissivity import ROUGH, error_of_grid, next_to_closing
@@ -473,11 +473,9 @@ class PatchLeakObserver(LeakObserver):
     def _total(self, transmissivity: Array, axis: int) -> float:
         """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
         patches = self._coupling.parts.patches
-        own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
-        lengths = patches.lengths
-        if axis:
-            own, lengths = [one.T for one in own], lengths[::-1]
-        return network_flow(cell_network(own[0], lengths, across=own[1])).total
+        maps = (transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis))
+        (along, lengths), (across, _) = (turned(one, patches.lengths, axis) for one in maps)
+        return network_flow(cell_network(along, lengths, across=across)).total
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the leak, and of patches in its place."""
