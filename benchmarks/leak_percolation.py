@@ -13,7 +13,8 @@ import numpy as np
 
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.transport import cell_network, gap_flow
+from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.transport import gap_flow
 
 SURFACES = 10
 RMS_SLOPE, MODULUS = 0.1, 1000.0

@@ -312,8 +312,8 @@ FAULTS = [
     ),
     Fault(
         "multiscale",
-        "factor = np.maximum(_apart(own, half)",
-        "factor = 0.1 * np.maximum(_apart(own, half)",
+        "error = np.maximum(_HALF * change",
+        "error = 0.1 * np.maximum(_HALF * change",
         "verification/test_leak.py unit/multiscale/test_leak_in_scenes.py",
     ),
 ]

@@ -9,7 +9,7 @@ them by name.
     boundary_elements → complementarity → half_space  the contact problem on cells
     friction                                          tractions, stick and slip on the cells
     asperities                                        summits that interact pair by pair
-    gap_pools → gap_multigrid → gap_iteration → transport   leak through gaps, conductance of spots
+    gap_cells → gap_pools → gap_multigrid → gap_iteration → transport   leaks, conductance of spots
 """
 
 from patchlaw.support.packages import public_names

@@ -14,10 +14,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import ndimage, sparse
-from scipy.sparse import csgraph
+from scipy import ndimage
 
+from patchlaw.micro.gap_cells import cell_links, joined_pools, turned
 from patchlaw.micro.gap_multigrid import COARSEST, PARITIES, Cells, Cycle, Offset, Parts, shifted
 from patchlaw.support import Array
 
@@ -93,36 +92,13 @@ def cell_flows(
     return [(found[k], flow) for k, flow in enumerate(flows.tolist())]
 
 
-def joined_pools(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
-    """Return a number for each pool that those share which paths over sides join, 0 for contact.
-
-    Args:
-        pools: Number of the pool that a cell belongs to, 0 for contact, shape (nx, ny).
-        count: How many there are.
-        axis: Axis along which the map continues over its sides.
-    """
-    pairs = np.stack([pools.take(0, axis), pools.take(-1, axis)])
-    pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
-    graph = sparse.coo_matrix((np.ones(pairs.shape[1]), pairs), (count + 1, count + 1))
-    joined = 1 + csgraph.connected_components(graph, False)[1]
-    joined[0] = 0
-    return np.asarray(joined)
-
-
 def _links(gap: Array, lengths: tuple[float, float], axis: int, periodic: bool) -> list[Array]:
     """Return links along x and y, and those to source and sink, as `potentials` takes them."""
-    shape = gap.shape
-    wide = lengths[1] / shape[1] / (lengths[0] / shape[0])
-    widths = wide, 1.0 / wide
-    with np.errstate(divide="ignore"):
-        half = 0.5 / (gap * gap * gap)  # of the way between centres lies in each of two cells
-    found = []
-    for along in (0, 1):
-        links = widths[along] / (half + np.roll(half, -1, along))
-        if along == axis or not periodic:
-            np.moveaxis(links, along, 0)[-1] = 0.0
-        found.append(links)
-    return [*found, widths[axis] / half.take((0, -1), axis).swapaxes(0, axis)]
+    gap, lengths = turned(gap, lengths, axis)
+    along, across = cell_links(gap * gap * gap, lengths, periodic=periodic)
+    ends = along[[0, -1]]
+    along[-1] = 0.0
+    return [*((across.T, along[1:].T) if axis else (along[1:], across)), ends]
 
 
 def potentials(

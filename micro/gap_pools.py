@@ -10,16 +10,13 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import csgraph, linalg
+from scipy.sparse import linalg
 
 from patchlaw.support import Array
-
-Numbers: TypeAlias = NDArray[np.integer]
+from patchlaw.support.network import Numbers, joined
 
 _NARROW = 0.1
 """Links of a pool to others and to terminals, over the sum of all links of its cells, below which
@@ -83,7 +80,7 @@ def _grown(head: Numbers, link: Array, terminals: Array, sums: Array) -> tuple[N
     """
     cells = np.arange(len(sums))
     to = np.where(sums > 0.0, head[link.argmax(axis=0), cells], int(sums.argmin()))
-    found: Numbers = _joined(cells, to, len(sums))  # closed cells with each other
+    found: Numbers = joined(cells, to, len(sums))  # closed cells with each other
     own, sides = found, np.nonzero(link)
     tail: Numbers = sides[1]
     head, link = head[sides], link[sides]
@@ -101,15 +98,8 @@ def _grown(head: Numbers, link: Array, terminals: Array, sums: Array) -> tuple[N
         along = ((out > _NARROW * sums) & (widest > 0.0))[tail] & (link == widest[tail])
         if not along.any():
             return found, count
-        own = _joined(tail[along], head[along], count)
+        own = joined(tail[along], head[along], count)
         found = own[found]
-
-
-def _joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
-    """Return a number for each of so many nodes that those share which links join."""
-    links = _matrix(np.ones(len(tail)), tail, head, (count, count))
-    joined: Numbers = csgraph.connected_components(links, directed=False)[1]
-    return joined
 
 
 def _matrix(

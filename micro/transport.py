@@ -28,13 +28,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from patchlaw.micro.gap_cells import cell_links, cell_network, joined_pools, link_ends, turned
 from patchlaw.support import Array, Flags, Indices, InputError
-from patchlaw.support.network import Network, banded, narrowest_link, network_flow
+from patchlaw.support.network import Numbers, banded, narrowest_link, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
@@ -160,7 +161,7 @@ class GapFlow:
         channel[1:-1] = beside & (pools == pools.flat[cell - above.shape[1]])
         share = sum(
             np.abs(flow[tail | head]).sum()
-            for flow, (tail, head) in zip((along, across), _ends(channel), strict=True)
+            for flow, (tail, head) in zip((along, across), link_ends(channel), strict=True)
         )
         x, y = np.divmod(cell, above.shape[1])
         length, width = turned.sides
@@ -243,9 +244,9 @@ def _factorised_flow(
     gap: Array, lengths: tuple[float, float], axis: int, periodic: bool
 ) -> tuple[Array, float]:
     """Return fluid pressures of cells, shape (nx, ny), and the flow, by a factorisation."""
-    turned, sides = _turned(gap, lengths, axis)
-    solution = network_flow(cell_network(turned**3, sides, periodic=periodic), banded)
-    pressure = solution.potential[:-2].reshape(turned.shape)
+    along, sides = turned(gap, lengths, axis)
+    solution = network_flow(cell_network(along**3, sides, periodic=periodic), banded)
+    pressure = solution.potential[:-2].reshape(along.shape)
     return (pressure.T if axis else pressure), solution.total
 
 
@@ -274,11 +275,11 @@ class _Turned:
     """
 
     def __init__(self, flow: GapFlow) -> None:
-        self.gap, self.sides = _turned(flow.gap, flow.lengths, flow.axis)
+        self.gap, self.sides = turned(flow.gap, flow.lengths, flow.axis)
         nx, ny = self.gap.shape
         self.cubes, self.pressure = np.full((nx + 2, ny), np.inf), np.ones((nx + 2, ny))
         self.cubes[1:-1] = self.gap * self.gap * self.gap
-        self.pressure[1:-1], _ = _turned(flow.pressure, flow.lengths, flow.axis)
+        self.pressure[1:-1], _ = turned(flow.pressure, flow.lengths, flow.axis)
         self.pressure[-1] = 0.0
         self._periodic = flow.periodic
         self.links = cell_links(self.cubes[1:-1], self.sides, periodic=flow.periodic)
@@ -286,14 +287,12 @@ class _Turned:
     @property
     def flows(self) -> list[Array]:
         """Flows through the links, 0 in pools that no path from a side leads to."""
-        ends = zip(self.links, _ends(self.pressure), strict=True)
+        ends = zip(self.links, link_ends(self.pressure), strict=True)
         return [np.nan_to_num(link * (tail - head), copy=False) for link, (tail, head) in ends]
 
-    def pools(self, some: Flags) -> NDArray[np.integer]:
+    def pools(self, some: Flags) -> Numbers:
         """Return a number for each of some cells that those share which paths join, 0 of others."""
         from scipy import ndimage
-
-        from patchlaw.micro.gap_iteration import joined_pools
 
         pools, count = ndimage.label(some)
         return joined_pools(pools, count, 1)[pools] if self._periodic else pools
@@ -318,54 +317,14 @@ class _Turned:
         node = self.pools(wide)
         node[~wide] = node.max() + 1 + np.arange(wide.size - wide.sum())
         cells, parts = np.arange(wide.size, dtype=np.intc).reshape(wide.shape), []
-        for link, places, (tail, head) in zip(self.links, _ends(cells), _ends(node), strict=True):
+        for link, places, (tail, head) in zip(
+            self.links, link_ends(cells), link_ends(node), strict=True
+        ):
             some = (tail != head) & (link >= least)
             parts.append([one[some] for one in (*places, tail, head, link)])
         first, second, tail, head, link = map(np.concatenate, zip(*parts, strict=True))
         narrowest = narrowest_link(tail, head, link, (node[0, 0], node[-1, 0]))
         return np.array([first[narrowest], second[narrowest]])
-
-
-def _ends(values: NDArray[Any]) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Return what cells at the tails and heads of links along x and along y have.
-
-    Args:
-        values: That of cells and terminals, shape (nx + 2, ny).
-    """
-    inner = values[1:-1]
-    return [(values[:-1], values[1:]), (inner, np.roll(inner, -1, axis=1))]
-
-
-def cell_links(
-    conductivity: Array,
-    lengths: tuple[float, float],
-    *,
-    across: Array | None = None,
-    periodic: bool = False,
-) -> tuple[Array, Array]:
-    """Return the conductances of links along x and along y, 0 of closed ones.
-
-    Args:
-        conductivity: See `cell_network`.
-        lengths: Likewise.
-        across: Likewise.
-        periodic: Likewise.
-
-    Returns:
-        From the inlet at x = 0 through all cells to the outlet, shape (nx + 1, ny); and from each
-        cell to the next one, from the last to the first, shape (nx, ny).
-    """
-    nx, ny = conductivity.shape
-    width = (lengths[1] / ny) / (lengths[0] / nx)
-    # half of a link between two cells lies in each of them; those to a side end there
-    with np.errstate(divide="ignore"):
-        half = 0.5 / conductivity
-        half_across = half if across is None else 0.5 / across
-    along_x = width / np.concatenate([half[:1], half[:-1] + half[1:], half[-1:]])
-    along_y = 1.0 / (width * (half_across + np.roll(half_across, -1, axis=1)))
-    if not periodic:
-        along_y[:, -1] = 0.0
-    return along_x, along_y
 
 
 def widened_gap(gap: Array, *, periodic: bool) -> Array:
@@ -387,45 +346,6 @@ def widened_gap(gap: Array, *, periodic: bool) -> Array:
     if not periodic:
         part[[0, -1]] = part[:, [0, -1]] = 1.0
     return np.where(at_contact, gap + part * (cells.max(axis=0) - gap), gap)
-
-
-def cell_network(
-    conductivity: Array,
-    lengths: tuple[float, float],
-    *,
-    across: Array | None = None,
-    periodic: bool = False,
-) -> Network:
-    """Return the network of the cells of a map, whose inlet is at x = 0 and outlet at x = Lx.
-
-    Cell [ix, iy] is node ix ny + iy.
-
-    Args:
-        conductivity: Conductivity of the cells, 0 where closed, shape (nx, ny). That of a gap is
-            g³ [mm³].
-        lengths: Sides of the map [mm].
-        across: Their conductivity along y, where it is another one than along x.
-        periodic: Whether the map continues over the sides y = 0 and y = Ly.
-    """
-    nx, ny = conductivity.shape
-    links = cell_links(conductivity, lengths, across=across, periodic=periodic)
-    conductance = np.concatenate([one.ravel() for one in links])
-    cells = np.arange((nx + 2) * ny).reshape(nx + 2, ny) - ny
-    cells[0], cells[-1] = nx * ny, nx * ny + 1
-    (tail, head), is_open = zip(*_ends(cells), strict=True), conductance > 0.0
-    return Network(
-        count=nx * ny,
-        tail=np.concatenate([one.ravel() for one in tail])[is_open],
-        head=np.concatenate([one.ravel() for one in head])[is_open],
-        conductance=conductance[is_open],
-    )
-
-
-def _turned(
-    gap: Array, lengths: tuple[float, float], axis: int
-) -> tuple[Array, tuple[float, float]]:
-    """Return a map and its sides with the flow along the first axis."""
-    return (gap.T, (lengths[1], lengths[0])) if axis else (gap, lengths)
 
 
 Number = TypeVar("Number", float, Array)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +32,12 @@ _GOAL = 0.1 * MOST_IMBALANCE
 """Imbalance at which the iteration stops. Potentials lie between those of the terminals, so that
 the flow errs by as much of itself at most."""
 _MOST_ITERATIONS = 500
+_FEW = 10_000
+"""Links of which a spanning tree is made, rather than half of them looked at."""
 _GROWTH = 2.0
 """Growth of the imbalance over its least at which the iteration begins anew from where it is."""
 
+Numbers: TypeAlias = NDArray[np.integer]
 Inverse = Callable[[Array], Array]
 """Returns an approximate solution of a linear system for its right side."""
 Preconditioner = Callable[[sparse.csr_matrix], Inverse]
@@ -98,9 +102,7 @@ class Network:
     @cached_property
     def joined(self) -> NDArray[np.integer]:
         """A number for each node that those share which links join, shape (n + 2,)."""
-        links = self._matrix(np.ones(len(self.tail)))
-        joined: NDArray[np.integer] = csgraph.connected_components(links, directed=False)[1]
-        return joined
+        return joined(self.tail, self.head, self.count + 2)
 
     @property
     def percolates(self) -> bool:
@@ -146,52 +148,22 @@ class Network:
         among = self.conductance[order]
         if among.max(initial=0.0) <= _WIDEST_STEP * among.min(initial=np.inf):
             return np.full(self.count + 2, np.inf)
-        order = order[np.argsort(-self.conductance[order], kind="stable")]
-        ends = np.minimum(tail, head)[order] * (self.count + 2) + np.maximum(tail, head)[order]
-        order = order[np.unique(ends, return_index=True)[1]]  # the widest of links side by side
         rest = Network(self.count, tail[order], head[order], self.conductance[order])
         return _WIDEST_STEP * rest._widest_ways_out
-
-    @cached_property
-    def _tree(self) -> tuple[sparse.csr_matrix, Indices]:
-        """The maximum spanning tree, and the node before each on the way from the inlet."""
-        # of the minimum spanning tree, whose weights must be positive
-        weight = np.log(self.conductance.max() / self.conductance) + 1.0
-        tree = csgraph.minimum_spanning_tree(self._matrix(weight))
-        return tree, csgraph.breadth_first_order(tree, self.inlet, directed=False)[1]
 
     @property
     def _widest_ways_out(self) -> Array:
         """Smallest conductance on the widest path from nodes to the inlet, ∞ at it, (n + 2,)."""
-        if not len(self.tail):
-            return np.full(self.count + 2, np.inf)
-        before = self._tree[1]
-        nodes = np.flatnonzero(before >= 0)
         width = np.full(self.count + 2, np.inf)
-        width[nodes] = self.conductance[self._numbers(before[nodes], nodes)]
-        before = np.where(before < 0, np.arange(self.count + 2), before)
+        if not len(self.tail):
+            return width
+        before, link = _widest_paths(self.tail, self.head, self.conductance, self.inlet, len(width))
+        nodes = np.flatnonzero(before >= 0)
+        width[nodes] = self.conductance[link[nodes]]
+        before = np.where(before < 0, np.arange(len(width)), before)
         while (before != before[before]).any():  # each pass doubles the way looked along
             width, before = np.minimum(width, width[before]), before[before]
         return width
-
-    def _numbers(self, first: Indices, second: Indices) -> Indices:
-        """Return the numbers of the links between pairs of nodes."""
-        ends, order = self._sorted_ends
-        wanted = np.minimum(first, second) * (self.count + 2) + np.maximum(first, second)
-        return np.asarray(order[np.searchsorted(ends, wanted)])
-
-    @cached_property
-    def _sorted_ends(self) -> tuple[Indices, Indices]:
-        """Both ends of the links as one number, rising, and the numbers of the links."""
-        ends = np.minimum(self.tail, self.head) * (self.count + 2)
-        ends += np.maximum(self.tail, self.head)
-        order = np.argsort(ends, kind="stable")
-        return ends[order], order
-
-    def _matrix(self, values: Array) -> sparse.csr_matrix:
-        """Return values of links as a sparse matrix, each with an entry from tail to head."""
-        size = self.count + 2
-        return sparse.coo_matrix((values, (self.tail, self.head)), (size, size)).tocsr()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -214,16 +186,25 @@ class NetworkFlow:
     iterations: int = 0
 
 
-def narrowest_link(
-    tail: NDArray[np.integer],
-    head: NDArray[np.integer],
-    conductance: Array,
-    ends: tuple[int, int],
-) -> int:
+def joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
+    """Return a number for each of some nodes that those share which links join, shape (count,).
+
+    Args:
+        tail: Node where each of m links begins, shape (m,).
+        head: Node where it ends, shape (m,).
+        count: Number of nodes.
+    """
+    links = sparse.coo_matrix((np.ones(len(tail)), (tail, head)), (count, count)).tocsr()
+    found: Numbers = csgraph.connected_components(links, directed=False)[1]
+    return found
+
+
+def narrowest_link(tail: Numbers, head: Numbers, conductance: Array, ends: tuple[int, int]) -> int:
     """Return the number of the narrowest link on the widest path between two nodes.
 
-    Its conductance is the largest that the narrowest link of a path has. Where the wider half of
-    the links joins both nodes, the others are left out; otherwise nodes that it joins count as one.
+    Its conductance is the largest that the narrowest link of a path has. While there are many
+    links, and the wider half of them joins both nodes, the others are left out; otherwise nodes
+    that it joins count as one. The last ones' maximum spanning tree tells it.
 
     Args:
         tail: Node where each of m links begins, shape (m,).
@@ -232,22 +213,51 @@ def narrowest_link(
         ends: Both nodes, which links join.
 
     Source:
-        Camerini 1978, doi 10.1016/0020-0190(78)90030-3.
+        Camerini 1978, doi 10.1016/0020-0190(78)90030-3 (halves).
     """
-    link = np.arange(len(tail))
-    while len(link) > 1:
-        half, size = len(link) // 2, int(max(tail.max(), head.max(), *ends)) + 1
-        order = np.argpartition(-conductance[link], half - 1)
-        link, tail, head = link[order], tail[order], head[order]
-        wide = sparse.coo_matrix((np.ones(half), (tail[:half], head[:half])), (size, size))
-        joined = csgraph.connected_components(wide, directed=False)[1]
-        if joined[ends[0]] == joined[ends[1]]:
-            link, tail, head = link[:half], tail[:half], head[:half]
+    number = np.arange(len(tail))
+    while len(number) > _FEW:
+        half, size = len(number) // 2, int(max(tail.max(), head.max(), *ends)) + 1
+        order = np.argpartition(-conductance[number], half - 1)
+        number, tail, head = number[order], tail[order], head[order]
+        node = joined(tail[:half], head[:half], size)
+        if node[ends[0]] == node[ends[1]]:
+            number, tail, head = number[:half], tail[:half], head[:half]
         else:
-            ends, tail, head = (joined[ends[0]], joined[ends[1]]), joined[tail], joined[head]
+            ends, tail, head = (node[ends[0]], node[ends[1]]), node[tail], node[head]
             apart = tail != head
-            link, tail, head = link[apart], tail[apart], head[apart]
-    return int(link[0])
+            number, tail, head = number[apart], tail[apart], head[apart]
+    size = int(max(tail.max(), head.max())) + 1
+    before, link = _widest_paths(tail, head, conductance[number], ends[0], size)
+    path = [ends[1]]
+    while path[-1] != ends[0]:
+        path.append(int(before[path[-1]]))
+    along = number[link[path[:-1]]]
+    return int(along[conductance[along].argmin()])
+
+
+def _widest_paths(
+    tail: Numbers, head: Numbers, conductance: Array, root: int, size: int
+) -> tuple[Numbers, Numbers]:
+    """Return the next node on the widest path from each node to a root, and the link to it.
+
+    The paths are those of the maximum spanning tree. Shapes (size,); nodes are < 0 at the root and
+    where no path leads.
+
+    Source:
+        Hu 1961, doi 10.1287/opre.9.6.898.
+    """
+    order = np.argsort(-conductance, kind="stable")
+    pairs = np.minimum(tail, head).astype(np.int64) * size + np.maximum(tail, head)
+    order = order[np.sort(np.unique(pairs[order], return_index=True)[1])]  # the widest of each pair
+    rank = np.arange(1.0, len(order) + 1.0)
+    links = sparse.coo_matrix((rank, (tail[order], head[order])), (size, size)).tocsr()
+    tree = csgraph.minimum_spanning_tree(links)
+    before: Numbers = csgraph.breadth_first_order(tree, root, directed=False)[1]
+    edges, link = tree.tocoo(), np.full(size, -1)
+    child = np.where(before[edges.col] == edges.row, edges.col, edges.row)
+    link[child] = order[edges.data.astype(int) - 1]
+    return before, link
 
 
 def factorised(matrix: sparse.csr_matrix) -> Inverse:

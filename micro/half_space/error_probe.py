@@ -549,7 +549,7 @@ class _Problems:
         if grid not in self._states:
             nearest = self._states.get(self._half) if grid == self._quarter else None
             known = self._start if nearest is None else nearest.guess
-            start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
+            start = replace(known, values=on_grid(known.values, grid), by_slopes=None)
             model, displaced = self._without_slopes(grid), self._displaced(grid)
             self._states[grid] = model.press(self._control, start=start, displaced=displaced)
         return self._states[grid]
@@ -557,7 +557,7 @@ class _Problems:
     def _displaced(self, grid: tuple[int, int]) -> Array:
         """Return what finite slopes displace the cells of a grid by in the run [mm]."""
         by_slopes = self._start.by_slopes if self._probe.order else None
-        return np.zeros(grid) if by_slopes is None else _on_grid(by_slopes, grid)
+        return np.zeros(grid) if by_slopes is None else on_grid(by_slopes, grid)
 
     def _without_slopes(self, grid: tuple[int, int]) -> HalfSpaceModel:
         """Return the model on a grid, without finite slopes."""
@@ -574,8 +574,13 @@ def _lengths(found: NormalStiffness, state: ContactState) -> Array:
     )
 
 
-def _on_grid(field: Array, grid: tuple[int, int]) -> Array:
-    """Return a field on other cells of the same surface, by its means over them."""
+def on_grid(field: Array, grid: tuple[int, int]) -> Array:
+    """Return a field on other cells of the same surface, by its means over them.
+
+    Args:
+        field: Shape (nx, ny).
+        grid: Number of the other cells along x and y.
+    """
     nx, ny, x, y = *field.shape, *grid
     if nx % x == ny % y == 0:
         return np.asarray(field.reshape(x, nx // x, y, ny // y).mean(axis=(1, 3)))

@@ -2,7 +2,7 @@
 
 Each row is solved on the cells of the surface and on half and a quarter as many a side, whose
 differences are the error of the grid. Next to closing they tell little of it, and what flows where
-contact ends half a cell earlier bounds it.
+contact ends half a cell earlier tells more.
 
 Theory: docs/theory.md, section 16.
 """
@@ -47,11 +47,13 @@ def flow_memory(cells: int, tabled: int = 0) -> float:
 ROUGH = 1e-4
 """Error of flows that does no harm where they tell an error, or lie in a table whose rows tell them
 to some 10⁻³."""
-_QUARTER, _LEAST, _ENDS, _APART = 0.75, 0.02, 2.0, 3.0
-"""Parts that the error of a flow is at least: of the power by which it changes from a quarter to
-half as many cells a side, as either change may vanish by chance; of the flow; and of the flow next
-to closing, that is where one of these grids is closed, or a flow and that on half as many cells
-differ by this factor."""
+_HALF, _QUARTER, _LEAST = 1.2, 0.25, 0.01
+"""Parts that the error of a hydraulic gap is at least: of its change from half as many cells a
+side, and from a quarter to half as many, as either may vanish by chance; of the gap itself."""
+_APART, _CLOSING, _WIDER, _ENDS = 3.0, 0.4, 0.6, 0.05
+"""Next to closing, that is where one of these grids is closed, or a flow and that on half as many
+cells differ by a factor of 3, the same: of the change from half as many; of what the hydraulic gap
+grows by as contact ends half a cell earlier; and of the larger one on both grids."""
 
 
 def error_of_grid(
@@ -59,34 +61,29 @@ def error_of_grid(
 ) -> Array:
     """Return what flows through gaps may be off by as cells are not finer.
 
-    Flows change by factors as cells become finer: the largest counts of what grids half and a
-    quarter as fine tell; see the constants above for how much. Next to closing, where they fall by
-    orders of magnitude, it is at least what the flow grows by as contact ends half a cell earlier.
-    On 150 surfaces of 32² to 48² cells, 2 to 60 % in contact, against four times as many cells a
-    side, the true error was within 1.5 times this on 99 % of 600 flows
-    (`benchmarks/leak_error.py`).
+    The larger the load, the smaller the hydraulic gap, the cube root of T: it falls almost
+    linearly, and finer cells shift this line. So the differences between grids tell the error of
+    the hydraulic gap, where factors between flows overstate it. Next to closing they tell little,
+    and the widening of all gaps by a part of a cell does. The constants above were set on 460
+    surfaces, and on 74 about closing (`benchmarks/leak_error.py`).
 
     Args:
         flow: Flows, or transmissivities, of any shape and sign.
         half: The same on half as many cells a side.
         quarter: The same on a quarter as many.
         wider: The same through `widened_gap`, as far as `next_to_closing`; None where it is not
-            known.
+            known, and the others alone tell the error.
     """
-    own, half, quarter = map(np.abs, (flow, half, quarter))
-    factor = np.maximum(_apart(own, half), _apart(half, quarter) ** _QUARTER)
-    error = own * np.maximum(factor - 1.0, _LEAST)
-    most = _ENDS * np.maximum(own, half)
+    own, on_half, on_quarter = (np.cbrt(np.abs(one)) for one in (flow, half, quarter))
+    change = np.abs(own - on_half)
+    error = np.maximum(_HALF * change, _QUARTER * np.abs(on_half - on_quarter))
+    error = np.maximum(error, _LEAST * own)
     if wider is not None:
-        most = np.maximum(most, np.abs(wider) - own)
-    return np.where(next_to_closing(own, half, quarter), np.maximum(error, most), error)
-
-
-def _apart(first: Array, second: Array) -> Array:
-    """Return the factors between flows, 1 where one of two is closed."""
-    both = (first > 0.0) & (second > 0.0)
-    ratio = np.divide(first, second, out=np.ones(np.shape(both)), where=both)
-    return np.maximum(ratio, 1.0 / ratio)
+        grown = _WIDER * (np.cbrt(np.abs(wider)) - own)
+        least = np.maximum(_CLOSING * change, _ENDS * np.maximum(own, on_half))
+        closing = next_to_closing(flow, half, quarter)
+        error = np.where(closing, np.maximum(grown, least), error)
+    return np.asarray((own + error) ** 3 - own**3)
 
 
 def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Flags:
@@ -99,21 +96,21 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
     """
     own, half, quarter = map(np.abs, (flow, half, quarter))
     closed = (own == 0.0) | (half == 0.0) | (quarter == 0.0)
-    return np.asarray(closed | (_apart(own, half) > _APART))
+    return np.asarray(closed | (own > _APART * half) | (half > _APART * own))
 
 
 _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
-_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 8e-3, 8
-"""Rows are added on both sides of one whose T those beside it miss by more than this part of it,
-and of the error of the grid, or of T where that is less, until they are as near as this part of the
-separation at first touch, in so many passes at most. Ten samples, isotropic and turned, down to a
-fifth of that separation or to closing, had 7 to 26 rows, whose T between them erred by 0.1 % in the
-median, 1 % in 95 % of 354 flows and 11 % next to closing. Every second row left out told as much in
-99 % of them, and together with the error of the grid in all (`benchmarks/leak_rows.py`). With half
-of the grid's error in place of a quarter,
-errors between rows were wrong by a factor of ten next to closing."""
+_OFF, _MOST, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 0.75, 8e-3, 8
+"""Rows are added on both sides of one whose T those beside it miss by more than the third part of
+the error of the grid, but no less than the first and no more than the second part of T, until they
+are as near as this part of the separation at first touch, in so many passes at most. Ten samples,
+isotropic and turned, down to a fifth of that separation or to closing, had 7 to 26 rows, whose T
+between them erred by 0.1 % in the median, 1 % in 95 % of 354 flows and 11 % next to closing. Every
+second row left out told as much in 99 % of them, and together with the error of the grid in all
+(`benchmarks/leak_rows.py`). With half of T as the most, errors between rows were wrong by a factor
+of ten next to closing."""
 _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
@@ -157,8 +154,8 @@ def sample_transmissivity(
     rows = _solved(samples, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
-        error = np.minimum(error_of_grid(known, *coarser), known)
-        off = _missed(separation, known, np.maximum(_OFF * known, _OF_GRID * error))
+        error = _OF_GRID * error_of_grid(known, *coarser)
+        off = _missed(separation, known, np.clip(error, _OFF * known, _MOST * known))
         closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
         wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
         wide &= known[:-1].any(axis=1)

@@ -20,7 +20,7 @@ from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel
 from patchlaw.micro.boundary_elements.finite_slopes import SLOPES
-from patchlaw.micro.half_space.error_probe import ErrorProbe, OnBody, error_by_cells
+from patchlaw.micro.half_space.error_probe import ErrorProbe, OnBody, error_by_cells, on_grid
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models import describe
@@ -311,8 +311,14 @@ class CellCoupling(Coupling):
             if worn and depth is not None and isinstance(self.model, CellContact):
                 depth = depth + self.model.past.slid.apart
             whole = probe.model if depth is None else as_worn(probe.model, depth)
-            model = whole.resampled((nx, ny))
-            return probe.on_body(model, probe.order).press(control).open_gap
+            start = by_slopes = None
+            if known is not None and not self.scene.by_laws:
+                values = on_grid(known.pressures, (nx, ny))
+                start = replace(known.guess, values=values, by_slopes=None)
+                by_slopes = None if known.by_slopes is None else on_grid(known.by_slopes, (nx, ny))
+            order = probe.order if by_slopes is None else 0  # slopes are those of the step
+            model = probe.on_body(whole.resampled((nx, ny)), order)
+            return model.press(control, start=start, displaced=by_slopes).open_gap
 
         return on_root_alone(self.comm, solve)
 

@@ -3,8 +3,7 @@
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them. Next to closing it is what the leak grows by as contact ends half a cell earlier; see
-`multiscale.laws.transmissivity.error_of_grid`.
+them. Next to closing wider gaps tell it; see `multiscale.laws.transmissivity.error_of_grid`.
 
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
@@ -29,7 +28,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.transport import GapFlow, cell_network, gap_flows, widened_gap
+from patchlaw.micro.gap_cells import cell_network, turned
+from patchlaw.micro.transport import GapFlow, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
 from patchlaw.multiscale.laws.transmissivity import ROUGH, error_of_grid, next_to_closing
 from patchlaw.multiscale.loading.column import WAYS, Leak
@@ -473,11 +473,9 @@ class PatchLeakObserver(LeakObserver):
     def _total(self, transmissivity: Array, axis: int) -> float:
         """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
         patches = self._coupling.parts.patches
-        own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
-        lengths = patches.lengths
-        if axis:
-            own, lengths = [one.T for one in own], lengths[::-1]
-        return network_flow(cell_network(own[0], lengths, across=own[1])).total
+        maps = (transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis))
+        (along, lengths), (across, _) = (turned(one, patches.lengths, axis) for one in maps)
+        return network_flow(cell_network(along, lengths, across=across)).total
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the leak, and of patches in its place."""

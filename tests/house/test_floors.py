@@ -38,7 +38,7 @@ FLOORS = {
         "asperities contact_state meshes",
     ],
     "micro": [
-        "closed_forms gap_pools",
+        "closed_forms gap_cells gap_pools",
         "gap_multigrid",
         "gap_iteration",
         "transport",

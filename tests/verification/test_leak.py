@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 from benchmarks.leak_error import flows
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.transport import cell_network, gap_flow
+from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.transport import gap_flow
 from patchlaw.support.network import network_flow
 
 MODULUS = 1000.0

@@ -90,8 +90,10 @@ def test_flows_are_those_of_exact_fractions(seed, powers):
     assert np.abs(out[: net.count]).sum() <= MOST_IMBALANCE * found.total
 
 
+@pytest.mark.parametrize("few", [1, 10_000])
 @pytest.mark.parametrize("seed", range(12))
-def test_the_narrowest_link_is_that_of_a_search_link_by_link(seed):
+def test_the_narrowest_link_is_that_of_a_search_link_by_link(seed, few, monkeypatch):
+    monkeypatch.setattr("patchlaw.support.network._FEW", few)
     net = lattice(seed)
     if not net.percolates:
         assert widest(net) is None

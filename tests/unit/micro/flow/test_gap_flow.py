@@ -5,7 +5,8 @@ import pytest
 from scipy import ndimage
 
 from patchlaw.micro import gap_iteration, transport
-from patchlaw.micro.transport import cell_network, gap_flow, gap_flows, widened_gap
+from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.transport import gap_flow, gap_flows, widened_gap
 from patchlaw.support import InputError
 from patchlaw.support.network import narrowest_link
 
