@@ -116,13 +116,13 @@ class _SidePair:
         Returns:
             Shape (waves, f a, 2 b).
         """
-        cells = len(self.place)
+        cells, last = len(self.place), self.place[-1] + 1
         count = lines.shape[1] // (parts * cells)
-        placed = np.zeros((len(lines) * count * parts, self.place[-1] + 1), lines.dtype)
-        placed[:, self.place] = lines.reshape(-1, cells)
-        waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
-        by_side = waves.reshape(2, -1, count, parts, len(self.kernels)).transpose(4, 3, 1, 2, 0)
-        return np.ascontiguousarray(by_side).reshape(len(self.kernels), -1, 2 * count)
+        by_cell = lines.reshape(2, -1, count, parts, cells).transpose(4, 3, 1, 2, 0)
+        placed = (np.empty if last == cells else np.zeros)((last, *by_cell.shape[1:]), lines.dtype)
+        placed[self.place] = by_cell
+        waves = fft.rfft(placed.reshape(last, -1), 2 * len(self.kernels) - 2, axis=0)
+        return waves.reshape(len(self.kernels), -1, 2 * count)
 
     def on_cells(self, waves: Waves, parts: int = 1) -> Array:
         """Return means over the cells by values' waves, (waves, f a, 2 b): (b, f, rows, cells)."""
@@ -133,10 +133,10 @@ class _SidePair:
     def lines_of(self, waves: Waves, parts: int = 1) -> Array:
         """Return lines of values at the nodes by waves, (waves, f a, 2 b): (2 a, b f cells)."""
         count = waves.shape[2] // 2
-        by_part = waves.reshape(len(self.kernels), parts, -1, count, 2).transpose(4, 2, 3, 1, 0)
-        by_side = by_part.reshape(-1, len(self.kernels))
-        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
-        return lines.reshape(self.means.shape[1], -1)
+        by_wave = waves.reshape(len(self.kernels), -1)
+        lines = fft.irfft(by_wave, 2 * len(self.kernels) - 2, axis=0)[self.place]
+        by_side = lines.reshape(len(self.place), parts, -1, count, 2).transpose(4, 2, 3, 1, 0)
+        return by_side.reshape(self.means.shape[1], -1)
 
     def add_between(self, total: Array, row: Indices, cell: Indices) -> None:
         """Add the displacements of n cells by unit pressures on them, shape (n, n)."""
