@@ -71,7 +71,7 @@ class _SidePair:
         means, combined = _means(sides, axis, rows, nodes)
         # waves on twice the length of a side that cells take for the same, some running backwards
         waves = np.add.outer((-period, 0, period), np.arange(cells + 1))
-        kernels = 0.0
+        kernels: Array = np.zeros(())
         for some in waves:
             of_nodes = (sides.stresses if stress else sides.compliance)(axis, nodes, np.abs(some))
             if stress:
