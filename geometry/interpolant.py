@@ -116,24 +116,20 @@ class Interpolant:
         They are means over the rectangle, exact but for rounding, as products of B-splines are
         integrated by four Gauss points a span. Heights count from their mean.
         """
-        whole, (along, one_x), (across, one_y) = (
-            (0, 0),
-            self._b_splines_at(0, 0),
-            self._b_splines_at(1, 0),
-        )
-        heights = self._derived_coefficients(whole)
-        level = float(one_x @ along @ heights @ across.T @ one_y)
-        squares = [self._mean_product(one, one) for one in (whole, (1, 0), (0, 1), (2, 0), (0, 2))]
-        bends = squares[3] + squares[4] + 2.0 * self._mean_product((2, 0), (0, 2))
-        return [squares[0] - level**2, *squares[1:], bends]
+        axes = [[self._b_splines_at(axis, order) for order in range(3)] for axis in (0, 1)]
 
-    def _mean_product(self, one: tuple[int, int], other: tuple[int, int]) -> float:
-        """Return the mean of the product of two derivatives over the rectangle."""
-        products = self._derived_coefficients(other)
-        for axis in (0, 1):
-            (left, weights), (right, _) = (self._b_splines_at(axis, d[axis]) for d in (one, other))
-            products = (left.multiply(weights[:, None]).T @ right @ products).T
-        return float(np.vdot(self._derived_coefficients(one), products))
+        def mean_product(one: tuple[int, int], other: tuple[int, int]) -> float:
+            products = self._derived_coefficients(other)
+            for splines, first, second in zip(axes, one, other, strict=True):
+                (left, weights), (right, _) = splines[first], splines[second]
+                products = (left.multiply(weights[:, None]).T @ right @ products).T
+            return float(np.vdot(self._derived_coefficients(one), products))
+
+        (along, one_x), (across, one_y) = axes[0][0], axes[1][0]
+        level = float(one_x @ along @ self._derived_coefficients((0, 0)) @ across.T @ one_y)
+        squares = [mean_product(one, one) for one in ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2))]
+        bends = squares[3] + squares[4] + 2.0 * mean_product((2, 0), (0, 2))
+        return [squares[0] - level**2, *squares[1:], bends]
 
     def _derived_coefficients(self, order: tuple[int, int]) -> Array:
         """Return the B-spline coefficients of a derivative, shape (n, m)."""

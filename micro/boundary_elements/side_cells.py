@@ -69,17 +69,18 @@ class _SidePair:
         step, period = length / rows, 2 * cells
         nodes = _nodes(length, rows, stress=stress)
         means, combined = _means(sides, axis, rows, nodes)
-        parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
-        for shift in (-period, 0, period):
-            waves = np.arange(cells + 1) + shift
-            of_nodes = (sides.stresses if stress else sides.compliance)(axis, nodes, np.abs(waves))
-            kernels = combined @ of_nodes @ combined.T
+        waves = np.add.outer((-period, 0, period), np.arange(cells + 1))
+        kernels: Array = np.zeros(())
+        for some in waves:
+            of_nodes = (sides.stresses if stress else sides.compliance)(axis, nodes, np.abs(some))
             if stress:
-                kernels[2] *= np.sign(waves)[:, None, None]
-                kernels = np.concatenate(kernels, axis=1)
-            parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernels)
-        return cls(means, np.sum(parts, axis=0), np.arange(cells))
+                of_nodes[2] *= np.sign(some)[:, None, None]
+            kernels = kernels + (step * np.sinc(some / period) ** 2)[:, None, None] * of_nodes
+        kernels = combined @ kernels @ combined.T
+        if stress:
+            kernels = np.concatenate(kernels, axis=1)
+        return cls(means, kernels, np.arange(cells))
 
     def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
         """Return the sides across y of a square from those across x: waves do the same there."""

@@ -474,16 +474,17 @@ class _Problems:
         by_cells[2] = max(by_cells[2], whole["grid"] - force["grid"], part)
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
-            elastic = self._lengths_on(self._grid)[1]
+            elastic = self._lengths_on(self._grid, further=False)[1]
             by_cells = _OF_YIELDING * by_cells[[0, 0, 2]]
             by_cells[1] += _share_by_cells(elastic, half[1], quarter[1])
         shares["grid"] = force["grid"] + by_cells
         return shares
 
-    def _lengths_on(self, grid: tuple[int, int]) -> Array:
+    def _lengths_on(self, grid: tuple[int, int], *, further: bool = True) -> Array:
         """Return forces over stiffnesses on a grid under the run's force, shape (3,).
 
-        They are those of the interface, of its elastic cells, and against the approach.
+        They are those of the interface, of its elastic cells, and against the approach; all elastic
+        where it is not asked how cells yield ``further``.
 
         At the same approach coarse cells may hardly touch, where they fall to nothing.
         """
@@ -494,7 +495,7 @@ class _Problems:
             start = known.guess if known and known.force else None
             state = model.press(control, start=start, displaced=self._displaced(grid))
         elastic = found = model.unloading_stiffness(state, turns=self._asked.turns)
-        if model.hardness is not None and not self._asked.elastic:
+        if further and model.hardness is not None and not self._asked.elastic:
             found = model.stiffness(state, turns=self._asked.turns)
         own, approach = _lengths(found, state)
         return np.array([own, _lengths(elastic, state)[0], approach])

@@ -7,6 +7,8 @@ made by `new_figure`, in one of two widths, and written by `save`.
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ContextDecorator
 from io import BytesIO
@@ -16,10 +18,12 @@ from typing import Any, cast
 
 import numpy as np
 from matplotlib import colormaps, cycler, rc_context, rcParams, rcParamsDefault
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from matplotlib.transforms import ScaledTranslation
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.support import Array
@@ -70,6 +74,8 @@ ONE_COLUMN, FULL_WIDTH = 3.5, 7.2
 MARGINS = {"left": 0.62, "right": 0.14, "bar": 0.9, "below": 0.46, "above": 0.28, "title": 0.26}
 """Room around panels for their labels, for a colour bar, and for the title of a figure [inch]."""
 
+_X_LABEL = 0.257
+"""Distance of the labels of x from their axes [inch]."""
 _PANEL_HEIGHT = 1.96
 """Height of a panel beside square maps [inch]."""
 _OBLONG = 0.5
@@ -104,12 +110,6 @@ _WHOLE_STYLE = {
 } | STYLE
 """All parameters, whatever a file of the user's says: figures are the same everywhere."""
 
-_FILES: dict[str, dict[str, Any]] = {
-    "png": {"pil_kwargs": {"compress_level": 1}},  # 6, the usual one, takes 40 % longer
-    "svg": {"metadata": {"Date": None}},
-}
-"""How files are written, by kind."""
-
 
 def styled() -> Any:
     """Return a decorator, or context, in which matplotlib draws in this style."""
@@ -135,14 +135,22 @@ class StyledFigure(Figure):
 
     def _repr_png_(self) -> bytes:
         """Return the figure as PNG, which notebooks show; they need not import pyplot for it."""
-        content = BytesIO()
-        self.savefig(content, format="png", dpi=_NOTEBOOK_DOTS)
-        return content.getvalue()
+        return _png_of(self, _NOTEBOOK_DOTS)
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Write the figure, by default in `DOTS_PER_INCH`."""
         with styled():
             super().savefig(fname, **options)
+
+
+class _Ticks(MaxNLocator):
+    """Ticks none of which is out of view, as matplotlib makes five objects for each."""
+
+    def __call__(self) -> Any:
+        """Return the places of the ticks."""
+        low, high = sorted(self.axis.get_view_interval())
+        slack = 1e-9 * (high - low)
+        return [at for at in super().__call__() if low - slack <= at <= high + slack]
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -262,9 +270,11 @@ def _in_rows(
             wide, tall = width / columns - beside, scale * high - below - MARGINS["above"]
             place = (left / width, (top + below) / height, wide / width, tall / height)
             axes.append(figure.add_axes(place))
-            # few ticks, of which matplotlib makes five objects each
-            axes[-1].locator_params(axis="x", nbins=max(1, min(6, int(wide / 0.31))))
-            axes[-1].locator_params(axis="y", nbins=max(1, min(6, int(tall / 0.21))))
+            for axis, most in ((axes[-1].xaxis, wide / 0.31), (axes[-1].yaxis, tall / 0.21)):
+                axis.set_major_locator(_Ticks(max(1, min(6, int(most))), steps=[1, 2, 2.5, 5, 10]))
+            # a fixed place, as finding one takes as long as drawing the ticks anew
+            under = ScaledTranslation(0.0, -_X_LABEL, figure.dpi_scale_trans)
+            axes[-1].xaxis.set_label_coords(0.5, 0.0, axes[-1].transAxes + under)
     if title:
         figure.suptitle(title, y=1.0 - 0.08 / height)
     for spare in axes[count:]:
@@ -282,12 +292,39 @@ def encoded(figure: Figure, kinds: Sequence[str] = ("png",)) -> dict[str, bytes]
     Returns:
         The contents by kind.
     """
-    contents = {}
-    for kind in kinds:
-        content = BytesIO()
-        figure.savefig(content, format=kind, **_FILES[kind])
-        contents[kind] = content.getvalue()
-    return contents
+    svg = BytesIO()
+    if "svg" in kinds:
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+    return {kind: _png_of(figure) if kind == "png" else svg.getvalue() for kind in kinds}
+
+
+def _png_of(figure: Figure, dots: int = DOTS_PER_INCH) -> bytes:
+    """Return a figure as PNG, in half the time of Pillow, which tries five codings of each row.
+
+    Args:
+        figure: The figure.
+        dots: Its dots per inch.
+
+    Source:
+        Portable Network Graphics, third edition, W3C 2025.
+    """
+    figure.set_dpi(dots)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    high, wide, _ = pixels.shape
+    rows = np.full((high, 1 + 3 * wide), 2, np.uint8)  # 2: less the row above
+    rows[:, 1:] = np.diff(pixels.reshape(high, -1), axis=0, prepend=np.uint8(0))
+    chunks = (
+        (b"IHDR", struct.pack(">2I5B", wide, high, 8, 2, 0, 0, 0)),  # 8 bits of each colour
+        (b"pHYs", struct.pack(">2IB", *2 * [round(dots / 0.0254)], 1)),  # per metre
+        (b"IDAT", zlib.compress(rows.tobytes(), 1)),
+        (b"IEND", b""),
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
+    )
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -336,7 +373,7 @@ def logarithmic(axis: Any) -> None:
     """
     low, high = axis.get_view_interval()
     if high < 5.0 * low:
-        axis.set_major_locator(MaxNLocator(4))
+        axis.set_major_locator(_Ticks(4))
     elif high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     far = high >= 100.0 * low and not 1e-4 < low < high < 1e5
@@ -484,7 +521,7 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     text = fill(label, max(12, int(high / 0.06)))
     bar.set_label(text, labelpad=2.5 if "\n" in text else 4.0, linespacing=1.0)
-    bar.locator = MaxNLocator(min(6, max(2, int(high / 0.25))), steps=[1, 2, 5, 10])
+    bar.locator = _Ticks(min(6, max(2, int(high / 0.25))), steps=[1, 2, 5, 10])
     return bar
 
 

@@ -80,13 +80,7 @@ def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
     highest = np.argsort(-asperities.z, kind="stable")[:MOST_SUMMITS]
     lowest = asperities.z[highest].min() if len(highest) < len(asperities) else -np.inf
     edge = np.flatnonzero(asperities.border_z >= lowest)
-    dot: dict[str, Any] = {
-        "marker": "o",
-        "ms": 3.0,
-        "mfc": style.VERMILLION,
-        "mec": "white",
-        "mew": 0.4,
-    }
+    dot: dict[str, Any] = dict(marker="o", ms=3.0, mfc=style.VERMILLION, mec="white", mew=0.4)
     cross: dict[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.8, "color": "black"}
     for x, y, chosen, look, label in (
         (asperities.x, asperities.y, highest, dot, "summits"),
@@ -173,10 +167,8 @@ def draw_bearing_ratio(axes: Any, surface: Surface) -> None:
     unit, heights = _centred(surface)
     axes.plot(share, np.percentile(heights, 100.0 - share), color=style.BLUE)
     axes.axhline(0.0, color=style.GREY, lw=0.8, zorder=1)
-    axes.set(xlabel="share of the surface above [%]", xlim=(0.0, 100.0))
-    axes.set(
-        ylabel=f"height over the mean plane [{unit}]", title="bearing ratio (Abbott–Firestone)"
-    )
+    axes.set(xlabel="share of the surface above [%]", ylabel=f"height over the mean plane [{unit}]")
+    axes.set(xlim=(0.0, 100.0), title="bearing ratio (Abbott–Firestone)")
 
 
 def _centred(surface: Surface) -> tuple[str, Array]:

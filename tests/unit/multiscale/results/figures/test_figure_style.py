@@ -1,6 +1,7 @@
 """All figures have one style, whoever draws them and whatever matplotlib is set to elsewhere."""
 
 import struct
+from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from matplotlib import rc_context, rcParams
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
+from matplotlib.image import imread
 
 from patchlaw.geometry import PatchGrid, Spectrum, roughness, synthesise
 from patchlaw.multiscale.results.figures import style
@@ -51,6 +53,21 @@ def test_files_have_200_dots_an_inch_and_an_svg_beside(tmp_path):
 
 def test_the_same_figure_gives_the_same_bytes():
     assert style.encoded(drawn()) == style.encoded(drawn())
+
+
+def test_png_files_show_what_matplotlib_writes():
+    figure, file = drawn(), BytesIO()
+    figure.savefig(file, format="png")
+    file.seek(0)
+    own = imread(BytesIO(style.encoded(figure)["png"]))
+    np.testing.assert_array_equal(own, imread(file)[..., :3])
+
+
+def test_no_ticks_are_made_out_of_view():
+    _, (axes,) = style.panels(1, 1, 2.0)
+    axes.set(xlim=(0.3, 9.7), ylim=(7.0, -1.0))
+    assert list(axes.get_xticks()) == [2.0, 4.0, 6.0, 8.0]
+    assert list(axes.get_yticks()) == [0.0, 2.0, 4.0, 6.0]
 
 
 def test_style_holds_when_the_figure_is_written_elsewhere():
