@@ -310,16 +310,13 @@ class AndersonMixing:
         self._last = interference, moved
 
 
-def solve_contact(
-    problem: CellProblem, start: ContactPressures | None, *, same_slopes: bool = False
-) -> ContactPressures:
+def solve_contact(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:
         problem: The contact problem; with the finite slopes of its compliance, if there are any.
         start: A solution nearby, its motion that of the solution where the approach is free; None
             starts from coarser grids.
-        same_slopes: Whether finite slopes add what they add at the start, where that is known.
 
     Raises:
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by
@@ -327,9 +324,6 @@ def solve_contact(
         BeyondFullContactError: When a period has no gap left at the approach.
     """
     compliance = problem.compliance
-    if same_slopes and start is not None and start.by_slopes is not None:
-        solution = solve_on_surface(problem.lowered_by(start.by_slopes), start)
-        return solution._replace(by_slopes=start.by_slopes)
     few = solved_on_few(problem, start)
     if few is not None:
         start, penetrates = few
