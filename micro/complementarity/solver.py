@@ -355,8 +355,9 @@ def pressure_rates(
 
 
 class _Rates(NamedTuple):
-    """Derivatives of pressures, what they leave of displacements, shape (n,) both, products, and
-    what finite slopes add to the mean displacement of all cells.
+    """Derivatives of pressures and what they leave of displacements, (n,) both, and products.
+
+    Last is what finite slopes add to the mean displacement of all cells.
     """
 
     rate: Array

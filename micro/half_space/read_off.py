@@ -36,6 +36,10 @@ slopes were off by 3 % where they were off by 1.3 %."""
 _ROUGH = 5e-5
 """Residual of the solutions there. On 11 contacts of 192² cells stiffnesses differed by 4e-5 at
 most from those with 1e-7, on periods by 6e-4; with 1e-5 they differed by as much."""
+_GROWTH = 2.0
+"""Power of the largest interference that what finite slopes add grows as. On 24 steep contacts (rms
+slopes of 0.4, 11 to 84 cells) stiffnesses were off by 0.7 % in the median and 0.18 × the stated
+error at most, with what slopes add here on all planes by 5 %; on ground steel by 0.04 %."""
 _NO_MOTIONS = np.zeros(3, bool)
 _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
@@ -120,8 +124,8 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     parabolas through the root of the force, over the mean gap or the approach, at this plane and
     two others: cells keep entering that soon carry the hardness, which the derivative for a fixed
     set of cells leaves out. One plane is nearer and one further away, on the curve of the first
-    loading; where the load is none of that, both are nearer. What finite slopes add grows as the
-    square of the largest interference there, as the force does about.
+    loading; where the load is none of that, both are nearer. What finite slopes add is not worked
+    out there, but grows with the largest interference about as the force does.
 
     Args:
         model: The surface and what it lies on.
@@ -143,7 +147,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     for way in ways:
         try:
             control = Control(approach=state.approach + way * away, tilt=tilt)
-            grown = None if slopes is None else (1.0 + way * away / largest) ** 2 * slopes
+            grown = None if slopes is None else (1.0 + way * away / largest) ** _GROWTH * slopes
             displaced = sum_of(state.displaced, grown)
             load = CellLoad(control, start, None if both else here, displaced)
             found, plane = small.pressures_under(load, tolerance=_ROUGH)
