@@ -54,9 +54,8 @@ _MATRIX_WORK, _MATRIX_CELLS = 2e5, 2500
 at most. On 32² to 256² cells between free sides a solution from one nearby takes 2 to 26 ms by the
 matrix there and 5 to 53 by transforms; at ten times that work they take equally long. Before that
 the matrix is made, which takes as long as a solution from nothing."""
-_DEPTHS = 1.2
-"""Ratio of the depths below the highest cell that such cells lie within. On 64² to 128² cells load
-steps that yield take 5 % less than with 1.5, elastic ones 1 to 30 % less; of 16 load steps, too."""
+_DEPTHS = 1.5
+"""Ratio of the depths below the highest cell that such cells lie within."""
 _ESTIMATE = 1e-2
 """Residual of the solution on a coarse grid that the approach is estimated from."""
 
