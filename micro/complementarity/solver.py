@@ -285,32 +285,26 @@ class ApproachRate(NamedTuple):
             converge or a period is in full contact.
         rates: Derivatives of pressures, shape (nx, ny) [MPa/mm].
         products: Products of the compliance.
+        by_slopes: Derivative of what finite slopes add to the mean displacement of all cells.
     """
 
     total: float
     rates: Array
     products: int
+    by_slopes: float = 0.0
 
-    def mean_displacement(self, problem: CellProblem, pressure: Array) -> float:
+    def mean_displacement(self, problem: CellProblem) -> float:
         """Return the derivative of the mean displacement of all cells by the approach.
 
         Single precision errs by 3e-7 of it.
 
         Args:
             problem: The contact problem.
-            pressure: Its solution, pressures, shape (nx, ny) [MPa].
         """
-        compliance, rates = problem.compliance, self.rates
-        grid = compliance.on_grid(rates.shape, problem.spacing, rough=True)
-        moved = float(grid.displacement(rates).mean()) if rates.any() else 0.0
-        if compliance.slopes and rates.any():
-            few = compliance.few_cells(rates.shape, problem.spacing)
-            if few is not None and few.hold(pressure):
-                loaded, rate = (field.ravel()[few.cells] for field in (pressure, rates))
-                moved += few.mean_slope_rate(loaded, rate)
-            else:
-                moved += float(compliance.slope_rate(pressure, rates).mean())
-        return moved
+        if not self.rates.any():
+            return 0.0
+        grid = problem.compliance.on_grid(self.rates.shape, problem.spacing, rough=True)
+        return float(grid.displacement(self.rates).mean()) + self.by_slopes
 
 
 def approach_rate(problem: CellProblem, pressure: Array) -> ApproachRate:
@@ -327,12 +321,13 @@ def approach_rate(problem: CellProblem, pressure: Array) -> ApproachRate:
         return ApproachRate(np.nan, rates, 0)  # equal pressures on all cells displace none
     few = problem.compliance.few_cells(pressure.shape, problem.spacing)
     if few is not None and not problem.motions.count and few.hold(pressure):
-        rates.ravel()[few.cells] = few.rate(pressure.ravel()[few.cells])
-        return ApproachRate(float(rates.sum()), rates, 1)
+        loaded = pressure.ravel()[few.cells]
+        rates.ravel()[few.cells] = rate = few.rate(loaded)
+        return ApproachRate(float(rate.sum()), rates, 1, few.mean_slope_rate(loaded, rate))
     found = _rates(problem, pressure, moving, np.ones(int(moving.sum())), _RATE_RESIDUAL)
     rates[moving] = found.rate
     total = float(found.rate.sum() + found.rate @ found.left)
-    return ApproachRate(total, rates, found.products)
+    return ApproachRate(total, rates, found.products, found.by_slopes)
 
 
 def pressure_rates(
@@ -360,11 +355,15 @@ def pressure_rates(
 
 
 class _Rates(NamedTuple):
-    """Derivatives of pressures, what they leave of displacements, and products; (n,) each."""
+    """Derivatives of pressures and what they leave of displacements, (n,) both, and products.
+
+    Last is what finite slopes add to the mean displacement of all cells.
+    """
 
     rate: Array
     left: Array
     products: int
+    by_slopes: float
 
 
 def _rates(
@@ -384,30 +383,31 @@ def _rates(
     shape, used = part.interference.shape, part.grid.products
     contact = ContactCells(part.grid, Cells.of(flat, shape), part.motions.modes_of(flat))
 
-    def displacement(change: Array) -> Array:
-        """Return the displacements of the moving cells by a change of their pressures."""
+    def displacement(change: Array) -> tuple[Array, float]:
+        """Return displacements of the moving cells, and the mean of all by slopes."""
         everywhere, here = np.zeros(pressure.shape), np.zeros(shape)
         here.ravel()[flat] = change
         moved = part.grid.displacement(here).ravel()[flat]
-        if problem.compliance.slopes:
-            everywhere[moving] = change
-            moved += problem.compliance.slope_rate(pressure, everywhere)[moving]
-        return moved
+        if not problem.compliance.slopes:
+            return moved, 0.0
+        everywhere[moving] = change
+        added = problem.compliance.slope_rate(pressure, everywhere)
+        return moved + added[moving], float(added.mean())
 
     # conjugate gradients; solutions of the elastic body without finite slopes precondition them
-    left = closing
+    left, by_slopes, before = closing, 0.0, np.inf
     rate, direction, answer = np.zeros((3, len(flat)))
-    before = np.inf
     for _ in range(_MOST_PASSES):
         size = float(np.abs(contact.balanced(left)).max())
         if size <= residual:
-            return _Rates(rate, left, part.grid.products - used)
+            return _Rates(rate, left, part.grid.products - used, by_slopes)
         stop = max(_RATE_FORCING * size, 0.25 * residual)
         step = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
         direction = step - float(step @ answer) / before * direction
-        answer = displacement(direction)
+        answer, added = displacement(direction)
         before = float(direction @ answer)
         length = float(direction @ left) / before
         rate += length * direction
+        by_slopes += length * added
         left = left - length * answer
-    return _Rates(np.full(len(flat), np.nan), left, part.grid.products - used)
+    return _Rates(np.full(len(flat), np.nan), left, part.grid.products - used, np.nan)

@@ -474,19 +474,22 @@ class _Problems:
         by_cells[2] = max(by_cells[2], whole["grid"] - force["grid"], part)
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
-            elastic = self._lengths_on(self._grid, further=False)[1]
+            elastic = self._lengths_on(self._grid, elastic=True)[1]
             by_cells = _OF_YIELDING * by_cells[[0, 0, 2]]
             by_cells[1] += _share_by_cells(elastic, half[1], quarter[1])
         shares["grid"] = force["grid"] + by_cells
         return shares
 
-    def _lengths_on(self, grid: tuple[int, int], *, further: bool = True) -> Array:
+    def _lengths_on(self, grid: tuple[int, int], *, elastic: bool = False) -> Array:
         """Return forces over stiffnesses on a grid under the run's force, shape (3,).
 
-        They are those of the interface, of its elastic cells, and against the approach; all elastic
-        where it is not asked how cells yield ``further``.
+        They are those of the interface, of its elastic cells, and against the approach.
 
         At the same approach coarse cells may hardly touch, where they fall to nothing.
+
+        Args:
+            grid: Its cells.
+            elastic: Whether all are wanted of the elastic cells alone.
         """
         model, known = self._without_slopes(grid), self._states.get(grid)
         state = known or self._state(self._grid)
@@ -494,11 +497,11 @@ class _Problems:
             control = replace(self._control, approach=None, force=self._asked.force)
             start = known.guess if known and known.force else None
             state = model.press(control, start=start, displaced=self._displaced(grid))
-        elastic = found = model.unloading_stiffness(state, turns=self._asked.turns)
-        if further and model.hardness is not None and not self._asked.elastic:
+        unloading = found = model.unloading_stiffness(state, turns=self._asked.turns)
+        if model.hardness is not None and not (elastic or self._asked.elastic):
             found = model.stiffness(state, turns=self._asked.turns)
         own, approach = _lengths(found, state)
-        return np.array([own, _lengths(elastic, state)[0], approach])
+        return np.array([own, _lengths(unloading, state)[0], approach])
 
     # --- answers, shape (3,)
 

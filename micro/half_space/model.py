@@ -490,14 +490,13 @@ class HalfSpaceModel:
         return self.with_slopes((self.slopes[0].lowered(depth), *self.slopes[1:]))
 
     def pressures_under(
-        self, load: CellLoad, *, tolerance: float = 0.0, same_slopes: bool = False
+        self, load: CellLoad, *, tolerance: float = 0.0
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return the solution of a contact problem without its sums: pressures and the plane.
 
         Args:
             load: What presses.
             tolerance: Largest residual, where it is larger than the model's.
-            same_slopes: Whether finite slopes add what they add at the start, where that is known.
         """
         control, start, _, displaced = load
         motion = control.prescribed(np.zeros(3))
@@ -518,7 +517,7 @@ class HalfSpaceModel:
         problem = replace(problem, tolerance=max(tolerance, self.tolerance))
         try:
             with blas_threads(1):  # all cores are taken by threads of ours
-                solved = solve_contact(problem, first, same_slopes=same_slopes)
+                solved = solve_contact(problem, first)
         except BeyondFullContactError as error:
             assert control.approach is not None
             raise no_gap_left(control.approach, error.beyond) from None

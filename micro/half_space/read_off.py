@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 import scipy
@@ -36,6 +36,10 @@ slopes were off by 3 % where they were off by 1.3 %."""
 _ROUGH = 5e-5
 """Residual of the solutions there. On 11 contacts of 192² cells stiffnesses differed by 4e-5 at
 most from those with 1e-7, on periods by 6e-4; with 1e-5 they differed by as much."""
+_GROWTH = 2.0
+"""Power of the largest interference that what finite slopes add grows as. On 24 steep contacts (rms
+slopes of 0.4, 11 to 84 cells) stiffnesses were off by 0.7 % in the median and 0.18 × the stated
+error at most, with what slopes add here on all planes by 5 %; on ground steel by 0.04 %."""
 _NO_MOTIONS = np.zeros(3, bool)
 _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
@@ -102,8 +106,12 @@ class ModelOfCells(Protocol):
         """Return the contact problem of a plane."""
         ...
 
+    def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Self:
+        """Return the model with other finite slopes."""
+        ...
+
     def pressures_under(
-        self, load: CellLoad, *, tolerance: float, same_slopes: bool
+        self, load: CellLoad, *, tolerance: float
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return pressures and the plane."""
         ...
@@ -116,8 +124,8 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     parabolas through the root of the force, over the mean gap or the approach, at this plane and
     two others: cells keep entering that soon carry the hardness, which the derivative for a fixed
     set of cells leaves out. One plane is nearer and one further away, on the curve of the first
-    loading; where the load is none of that, both are nearer. What finite slopes add is worked out
-    for one of them. For the other it is taken from the straight line.
+    loading; where the load is none of that, both are nearer. What finite slopes add is not worked
+    out there, but grows with the largest interference about as the force does.
 
     Args:
         model: The surface and what it lies on.
@@ -132,19 +140,21 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     away = _AWAY * largest * min(1.0, (_CELLS / np.count_nonzero(pressures)) ** 0.2)
     both = _is_first_loading(state)
     cell, gap = float(np.prod(model.surface.spacing)), float(state.gap.mean())
+    small, slopes = model.with_slopes(()), state.by_slopes
     tilt, used, start = None if turns else state.tilt, 0, here
     ways, known = (1.0, -1.0) if both else _FORWARD, {0.0: pressures}
     rows: list[list[float]] = []
     for way in ways:
         try:
             control = Control(approach=state.approach + way * away, tilt=tilt)
-            load = CellLoad(control, start, None if both else here, state.displaced)
-            found, plane = model.pressures_under(load, tolerance=_ROUGH, same_slopes=bool(rows))
+            grown = None if slopes is None else (1.0 + way * away / largest) ** _GROWTH * slopes
+            displaced = sum_of(state.displaced, grown)
+            load = CellLoad(control, start, None if both else here, displaced)
+            found, plane = small.pressures_under(load, tolerance=_ROUGH)
         except NotConverged as error:
             return NormalStiffness(iterations=used + error.iterations)
         known[way] = found.pressure
-        there = Start(plane=plane, values=found.pressure, by_slopes=found.by_slopes)
-        start = replace(here.towards(there, ways[1] / ways[0]), nearby=())
+        start = here.towards(Start(plane=plane, values=found.pressure), ways[1] / ways[0])
         force = float(found.pressure.sum()) * cell
         closed = gap - _mean_gap(model, found, plane, load)
         rows.append([way * away, closed, math.sqrt(force) - math.sqrt(state.force)])
@@ -194,9 +204,8 @@ def _mean_gap(
     below = model.interference(plane, load.lowered)
     problem = model.problem(below, _NO_MOTIONS, np.zeros(3))
     gap = problem.grid.displacement(found.pressure) - problem.interference
-    for more in (found.by_slopes, load.displaced):
-        if more is not None:
-            gap += more
+    if load.displaced is not None:
+        gap += load.displaced
     gap[(found.pressure >= problem.hardness) & (gap < 0.0)] = 0.0
     return float(gap.mean())
 
@@ -220,7 +229,7 @@ def unloading_stiffness(
         if state.force and not found.total > 0.0:
             # the approach of a period near full contact may turn back, with finite slopes
             return NormalStiffness(iterations=found.products)
-        closed = 1.0 - found.mean_displacement(problem, pressure)
+        closed = 1.0 - found.mean_displacement(problem)
     approach = found.total * float(np.prod(model.surface.spacing))
     own = approach / closed if closed > LEAST_CLOSING else None  # in full contact no gap closes
     return NormalStiffness(own, approach, found.products + 1)

@@ -5,8 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from patchlaw.micro import HalfSpaceModel
+from patchlaw.geometry import (
+    Control,
+    Material,
+    PatchGrid,
+    Spectrum,
+    Surface,
+    patch_means,
+    synthesise,
+)
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale import CellContact, LoadHistory, Problem
 from patchlaw.multiscale.observers.step_observers import missing_energy, work_of
 
@@ -272,6 +280,21 @@ def test_stiffness_while_yielding_knows_what_else_displaces_the_surface():
     found = made.stiffness(state)
     # rough solutions both ways
     assert found[:2] == pytest.approx(slopes_of_parabolas(made, state, displaced), rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_stiffness_while_yielding_knows_how_finite_slopes_grow(seed):
+    """Against solutions that work them out on every plane, and with what they add here on all."""
+    steep, material = rough(seed, 32), Material(young_modulus=4000.0, poisson_ratio=0.0)
+    steep = replace(steep, heights=2.0 * steep.heights)
+    made = model(steep, 600.0, slopes=(FiniteSlopes(steep, material),))
+    state = made.press(Control(approach=2e-2))
+    found = made.stiffness(state)
+    known = slopes_of_parabolas(made, state)
+    off = np.abs(np.divide(found[:2], known) - 1.0)
+    stays = slopes_of_parabolas(made.with_slopes(()), state, state.by_slopes)
+    assert off.max() < 0.25 * found.scatter
+    assert (off < 0.5 * np.abs(np.divide(stays, known) - 1.0)).all()
 
 
 def test_no_gap_closes_on_a_period_that_yields_everywhere():
