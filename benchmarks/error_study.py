@@ -2,7 +2,7 @@
 
 Run by hand, ten minutes on an idle core: `.venv/bin/python benchmarks/error_study.py
 [measured] [accuracy] [full] [turning] [pressing] [reading] [yielding] [wearing] [shearing] [harder]
-[sampled] [--first N] [--last N]`.
+[sampled] [--first N] [--last N] [--every N]`.
 
 Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
 plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
@@ -745,8 +745,9 @@ def main():
     parser.add_argument("what", nargs="*", default=["measured", "accuracy"])
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--last", type=int, default=SCENES)
+    parser.add_argument("--every", type=int, default=1, help="of laws of patches among reading: 8")
     given = parser.parse_args()
-    numbers = range(given.first, given.last)
+    numbers = range(given.first, given.last, given.every)
     if "measured" in given.what:
         rows = measured(numbers)
         tell(rows, "all")

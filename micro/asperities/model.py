@@ -407,7 +407,7 @@ class AsperityModel:
         return (
             f"at an approach of {plane.approach:.4g} mm the contacts cover {fraction:.1%} of the"
             f" surface: the model {self.name} of separate summits stands for up to"
-            f" {largest:.0%}"
+            f" {largest:.0%}; micro.model = 'half-space' has no such range"
         )
 
 

@@ -29,6 +29,7 @@ from patchlaw.micro.half_space.read_off import (
     CellLoad,
     check_plane,
     no_gap_left,
+    raised_by_slopes,
     stiffness,
     sums_of,
     unloading_stiffness,
@@ -264,9 +265,13 @@ class HalfSpaceModel:
         """
         surface, before, displaced = self.surface, load.before, load.displaced
         cell, energy, work = surface.spacing[0] * surface.spacing[1], np.nan, 0.0
+        warning, by_slopes = "", solved.by_slopes
         depth, worn = (None, None) if before is None else (before.plastic_depth, before.worn_depth)
         (pressure, yielding), displacement, gap, left = self._borne(solved), None, None, None
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
+        if by_slopes is not None and (by_slopes < 0.0).any():
+            below = self.interference(plane, load.lowered)
+            warning = raised_by_slopes(pressure, yielding, by_slopes, below)
         if means is None:
             worn = sum_of(worn, self._worn_off(pressure))
             interference = self.interference(plane, sum_of(depth, worn))
@@ -294,8 +299,9 @@ class HalfSpaceModel:
             worn_depth=worn,
             elastic_energy=energy,
             plastic_work=work,
-            by_slopes=solved.by_slopes,
+            by_slopes=by_slopes,
             displaced=displaced,
+            warning=warning,
         )
 
     def _borne(self, solved: ContactPressures) -> tuple[Array, Flags]:

@@ -299,6 +299,13 @@ def _attributes(column: Column) -> dict[str, str]:
     return {"long_name": column.meaning} | ({"units": column.unit} if column.unit else {})
 
 
+def _without_range(table: LawTable) -> str:
+    """Return what has no range of validity, unlike the model of a table of laws."""
+    if table.made_by["model"].startswith("half-space"):
+        return "micro.finite_slopes = false leaves out what holds up to there alone"
+    return "micro.model = 'half-space' has no such range"
+
+
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:
     """Yield a sentence when load steps lie outside the range of validity of the micro model.
 
@@ -321,12 +328,11 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
             if count := int(np.sum((pressure > 0.0) & (pressure >= limit))):
                 outside[step.step] = (
                     f"{count} of {limit.size} patches are loaded beyond the range of the model "
-                    f"{table.made_by['model']}"
+                    f"{table.made_by['model']}; {_without_range(table)}"
                 )
     if outside:
         first = min(outside)
         yield Caution(
             f"load steps outside the micro model's range of validity: {len(outside)} of "
-            f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
-            "no such range"
+            f"{len(steps)}; first step {first}: {outside[first]}"
         )

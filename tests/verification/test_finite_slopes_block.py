@@ -9,7 +9,8 @@ from helpers.meshed_slopes import forces_with_slopes_and_without
 
 from patchlaw.geometry import Control, Material
 from patchlaw.micro import FiniteSlopes
-from patchlaw.multiscale import Scene, make_setup
+from patchlaw.multiscale import Run, Scene, make_setup
+from patchlaw.support.readable import Caution
 
 
 class Counted(FiniteSlopes):
@@ -162,3 +163,30 @@ def test_loads_in_deep_corners_of_a_block_displace_it():
     assert np.allclose(more, more.T, atol=1e-9 * own.max())
     least = scipy.linalg.eigvalsh(own + more, 0.5 * (own + own.T)).min()
     assert least > 0.3
+
+
+@pytest.mark.long
+def test_pressures_that_finite_slopes_alone_make_are_told():
+    """Of a wavy ramp that is pressed until low corners touch, these bore eight Young's moduli."""
+    x = (np.arange(24) + 0.5) / 24
+    waves = np.multiply.outer(np.cos(2.8 * np.pi * x), np.cos(2.4 * np.pi * x))
+    heights = 0.45 * x[:, None] + 0.1 * waves
+    scene = Scene.from_dict(
+        {
+            "surface": {"heights": heights, "lengths": [1.0, 1.0]},
+            "block": MATERIAL | {"height": 0.6},
+            "micro": {"model": "half-space"},
+            "coupling": {"kind": "concurrent"},
+            "load": {"approach": 0.75 * float(np.ptp(heights)), "steps": 2},
+            "output": {"figures": False, "report": False, "check": "none"},
+        }
+    )
+    run = Run(scene)
+    some, all_corners = run.load_steps()
+    assert some.warnings == () and some.peak_pressure_MPa < 4000.0
+    assert all_corners.peak_pressure_MPa > 4000.0
+    (told,) = (note for note in run.history().notes if "finite slopes raise" in note)
+    assert isinstance(told, Caution)
+    assert "1 of 2; first step 2: finite slopes raise" in told
+    assert "micro.finite_slopes = false" in told
+    run.close()
