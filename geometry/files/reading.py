@@ -129,6 +129,11 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
             f"{hidden} heights lie below a mask of the file, and count as missing: delete the mask "
             "in Gwyddion where it marks what was measured"
         )
+    if topography.is_periodic:
+        notes.append(
+            "the file says that its heights continue periodically; here they do where [surface] "
+            "says periodic = true"
+        )
     return FileContent(
         heights=np.ma.filled(measured, np.nan),
         lengths=lengths,

@@ -44,6 +44,19 @@ def same_as_the_library(path, channel=None):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_file_may_say_that_heights_continue_periodically(tmp_path, periodic):
+    """SurfaceTopography writes so; nothing else in the file or the scene would tell."""
+    path = tmp_path / "map.nc"
+    heights = 1e-4 * files.NUMBERS
+    written = library().Topography(heights, (1.7, 4.6), unit="um", periodic=periodic)
+    written.to_netcdf(str(path))
+    surface = read_surface(path)
+    assert surface.lengths == pytest.approx((1.7e-3, 4.6e-3), rel=SINGLE)
+    assert periodic == any("continue periodically" in note for note in surface.notes)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("name", files.MAKERS)
 def test_instruments_files(tmp_path, name):
     path = tmp_path / name
