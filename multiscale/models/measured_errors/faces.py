@@ -39,7 +39,6 @@ from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
     SampleProbe,
-    closure_under,
     interpolation_errors,
     mean_error,
 )
@@ -72,6 +71,10 @@ _BY_CREASES, _MOST_KEPT_UNKNOWNS = 3e-3, 20_000
 have so many unknowns at most; other elements with so many are kept for later load steps. Creases
 between the facets of a faceted side disturb a uniform stress by 1e-4 to 1e-3 in places that no
 degree of elements resolves on the same mesh."""
+_LINE = 1e-3
+"""Share of the pressures up to which what is read off laws changes in proportion."""
+_SAME_CREASES = 5.0
+"""Ratio of forces up to which creases change alike: 9.7e-4 to 1.2e-3 of the force of a pad."""
 _TOLD = 0.57
 """Memory of the products that tell the error of linear elements over that of a solve: 1230 of 2150
 B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
@@ -94,6 +97,8 @@ class LawErrorProbe(SampleProbe):
         new_laws: The laws of the samples before they wore; of new samples those of `table`.
         zero: Error of the height that approaches count from [mm].
         elsewhere: By name other faces of small bodies, each with laws and the problem there.
+        creases: By the force what creases change in force, area, gap and stiffness, over these and
+            over the stiffness against the approach, shape (4,) [mm/N].
     """
 
     problem: LawContactProblem
@@ -105,7 +110,9 @@ class LawErrorProbe(SampleProbe):
     new_laws: Sequence[PatchLaw]
     zero: float = 0.0
     elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
+    creases: dict[float, Array] = field(default_factory=dict)
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
+    _read_under: dict[float, Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def control(self) -> Control:
@@ -187,21 +194,20 @@ class LawErrorProbe(SampleProbe):
         errors = np.array([share, share / self._gaps_by, share])
         if not math.isfinite(share) or not share:
             return errors
-        known, sizes = self._as_read, np.ones(3)
-        moved = np.max([abs(self._under(1.0 + by) - known) for by in (share, -share)], axis=0)
+        known, sizes, by = self._under(1.0), np.ones(3), max(share, _LINE)
+        moved = np.max([abs(self._under(1.0 + one) - known) for one in (by, -by)], axis=0)
         sizes[::2] = known[::2]
-        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
+        moved = np.divide(share / by * moved, sizes, out=errors.copy(), where=sizes > 0.0)
         return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
-
-    @cached_property
-    def _as_read(self) -> Array:
-        return self._under(1.0)
 
     def _under(self, times: float) -> Array:
         """Return what `_read_off` returns under so many times the pressures; collective."""
-        sampling = self.problem.sampling
-        pressure = max(times, 0.0) * self.state.sample_pressure
-        return self._read_off(self._closures_under(pressure, sampling.patch), sampling)
+        if times not in self._read_under:
+            sampling = self.problem.sampling
+            pressure = max(times, 0.0) * self.state.sample_pressure
+            closure = self._closures_under(pressure, sampling.patch)
+            self._read_under[times] = self._read_off(closure, sampling)
+        return self._read_under[times]
 
     def _read_off(self, closure: Array, sampling: Sampling, closing: Array | None = None) -> Array:
         """Return area, gap [mm] and stiffness [MPa/mm] by the laws, shape (3,).
@@ -274,7 +280,7 @@ class LawErrorProbe(SampleProbe):
 
     def _closures_under(self, pressure: Array, patch: Indices) -> Array:
         """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
-        return self._by_law(closure_under, pressure, patch)
+        return self._by_law(PatchLaw.closure_under, pressure, patch)
 
     def _by_law(
         self, function: Callable[[PatchLaw, Array], Array], values: Array, patch: Indices
@@ -328,9 +334,29 @@ class LawErrorProbe(SampleProbe):
             mesh, below = mesh + error, np.abs(quadratic - points)
         if mesh[0] < _BY_CREASES * abs(known[0]) and 8 * self._most <= _MOST_KEPT_UNKNOWNS:
             # creases, by quadratic elements on cells cut into eight
-            if (found := self._answer_of_kind("cut", on.refined_face, same=False)) is not None:
-                mesh = np.maximum(mesh, below + OF_REFINED * np.abs(found - quadratic))
+            mesh = np.maximum(mesh, below + OF_REFINED * self._by_creases(quadratic))
         return mesh, np.abs(points - known)
+
+    def _by_creases(self, quadratic: Array) -> Array:
+        """Return what cells cut into eight change in the answer on quadratic elements.
+
+        What creases displace is in proportion to the pressures, and force, area and gap err by it
+        in proportion to the stiffness besides: it is told once, and again where the force is
+        another one. The shear errs by the part that the force does, see `LawShearProbe`.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        force, stiffness = self.state.force, self.response.stiffness
+        changes, sizes = np.zeros_like(quadratic), stiffness * np.abs(self.answer[:4])
+        at = min(self.creases, key=lambda one: abs(math.log(one / force)), default=math.inf)
+        if abs(math.log(at / force)) > math.log(_SAME_CREASES):
+            at, found = force, self._answer_of_kind("cut", on.refined_face, same=False)
+            if found is None:
+                return changes
+            known = np.abs(found - quadratic)[:4]
+            self.creases[at] = np.divide(known, sizes, out=np.zeros(4), where=sizes > 0.0)
+        changes[:4] = self.creases[at] * sizes
+        return changes
 
     @cached_property
     def _most(self) -> int:

@@ -40,7 +40,7 @@ from patchlaw.micro.half_space.error_probe import ErrorProbe, coarser
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
-from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of
+from patchlaw.multiscale.models.measured_errors.samples import separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -78,8 +78,9 @@ step in which almost everything sticks may lose all of it or nothing."""
 _RESIDUAL, _OF_PRESSURES = 3e-3, 3e-4
 """Residuals of tractions and of pressures on the cells of samples: shift and energy lost of 32² and
 128² cells differed by 0.2 and 0.4 % at most from those with 1e-5 and 1e-8."""
-_SLIDES = 1.0 - 1e-6
-"""Shear stress over μ times the pressure from which on a law slides: cells do so under it, too."""
+_SLIDES, _STICKS = 1.0 - 1e-6, 0.02
+"""Shear stress over μ times the pressure from which on a law slides: cells do so under it, too; and
+up to which mean stresses that leave no shear force are those of the pressing alone."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -197,6 +198,9 @@ class LawShearProbe(LawErrorProbe):
         (control,) = parted_path([self.step])
         assert problem.sliders is not None
         problem.sliders.restore(self.before, near=True)
+        if not self.by_shift:  # the search for the shift begins where it ended
+            shift = np.array(self._shear.shift)
+            problem.sliders.memory = replace(problem.sliders.memory, shift=shift)
         return control, self.before
 
     def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
@@ -312,7 +316,7 @@ class LawShearProbe(LawErrorProbe):
             ):
                 here = float(law.pressure(max(closure, law.range[0])))
                 pressures = np.array([here / factor, here])
-                there, before = law.stiffness(closure_under(law, pressures))
+                there, before = law.stiffness(law.closure_under(pressures))
                 found.append(factor * there / before if here > 0.0 < before else 1.0)
             yield np.maximum(found, 0.1)
 
@@ -359,25 +363,40 @@ class LawShearProbe(LawErrorProbe):
             if new is law:
                 found.append(at)
                 continue
-            found.append(closure_under(law, new.pressure(at)))
+            found.append(law.closure_under(new.pressure(at)))
         return np.array(found)
 
     @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
-        paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+        laws = self.table.laws
+        paths = [self._path_of(*one, self._points) for one in enumerate(laws)]
+        pressed = self._only_pressed(paths)
+        if pressed:
+            paths = [self._path_of(*one, self._points[-1:]) for one in enumerate(laws)]
         errors = np.zeros((7, len(self.samples)))
-        tell = partial(self._of_sample, paths=paths)
+        tell = partial(self._of_sample, paths=paths, pressed=pressed)
         for number, own, areas in self.of_regions("check of friction", tell, paths):
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
         return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
 
-    def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
+    def _only_pressed(self, paths: Sequence[Sequence[_Reached]]) -> bool:
+        """Tell whether what the face shears by is that of the pressing alone."""
+        if math.hypot(*self._shear.force) > _NO_SHEAR * self.state.force:
+            return False
+        ends = zip(self.samples, paths, strict=True)
+        return all(
+            math.hypot(*reached.rate) <= _STICKS * region.coefficient
+            for region, path in ends
+            for reached in path
+        )
+
+    def _path_of(self, number: int, law: PatchLaw, points: Sequence[_Point]) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
         mu, one = self.samples[number].coefficient, np.zeros(1, np.intp)
         sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
         path, state, lost = list[_Reached](), sliders.at_rest, 0.0
-        for point in self._points:
+        for point in points:
             closure, slip = point.closure[number : number + 1], point.slip[number]
             if not np.isfinite(closure[0]):
                 path, state, lost = [], sliders.at_rest, 0.0
@@ -391,7 +410,7 @@ class LawShearProbe(LawErrorProbe):
         return path
 
     def _of_sample(
-        self, number: int, sample: Surface, paths: Sequence[Sequence[_Reached]]
+        self, number: int, sample: Surface, paths: Sequence[Sequence[_Reached]], pressed: bool
     ) -> Array:
         """Return how a sample ends a path, on its cells and on fewer, shape (3, 5).
 
@@ -421,6 +440,9 @@ class LawShearProbe(LawErrorProbe):
         if not self.by_shift and most >= _SLIDES * friction.coefficient:
             return found
         for row, times in enumerate((1, 2, 4)):
+            if row and pressed:  # what shears by the elements alone has no error by the cells
+                found[row] = found[0]
+                continue
             grid = sample.grid if times == 1 else coarser(sample, times)
             if row and min(sample.grid) // times < FEWEST_CELLS // 4:
                 continue

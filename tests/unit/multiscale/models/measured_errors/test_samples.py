@@ -13,6 +13,7 @@ from patchlaw.geometry import BlockShape, Control
 from patchlaw.macro import elastic_body
 from patchlaw.macro.contact import other_elements
 from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors import faces as law_errors
 from patchlaw.multiscale.models.measured_errors.errors import response_of
 from patchlaw.multiscale.models.measured_errors.faces import (
@@ -20,11 +21,7 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.models.measured_errors.samples import (
-    closure_under,
-    interpolation_errors,
-    mean_error,
-)
+from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
 from patchlaw.support import InputError, NotConverged
 from patchlaw.support.readable import quantity
 
@@ -213,15 +210,25 @@ def test_errors_of_samples_do_not_depend_on_the_unit_of_pressures():
     assert errors(math.pi) == pytest.approx(errors(1.0), rel=1e-5)
 
 
+class ReadOff:
+    """A law that closures under pressures are read off."""
+
+    range = -0.3, 1.1
+    closure_under, _places = PatchLaw.closure_under, PatchLaw._places
+
+    def pressure(self, closure):
+        return 7.0 * (closure + 0.3) ** 1.5
+
+
 def test_closures_under_pressures_near_first_touch_are_those_of_the_law():
     """Read off between even places, 1e-9 of the largest pressure led to 3e-12 of it."""
-    law = SimpleNamespace(range=(-0.3, 1.1), pressure=lambda closure: 7.0 * (closure + 0.3) ** 1.5)
+    law = ReadOff()
     pressure = np.geomspace(1e-12, 1.0, 37) * law.pressure(1.1)
-    assert law.pressure(closure_under(law, pressure)) == pytest.approx(pressure, rel=2e-3)
-    assert closure_under(law, np.array([0.0, 1e9])) == pytest.approx([-0.3, 1.1])
+    assert law.pressure(law.closure_under(pressure)) == pytest.approx(pressure, rel=2e-3)
+    assert law.closure_under(np.array([0.0, 1e9])) == pytest.approx([-0.3, 1.1])
 
 
-class NearlyClosed:
+class NearlyClosed(ReadOff):
     """A law whose gap closes as the inverse of the pressure: p = 1 / gap − 1 / 1.2 mm."""
 
     range = 0.0, 1.2 - 1.0 / 25.0
