@@ -173,7 +173,7 @@ class PatchLaw(Displayed):
         Args:
             pressure: The pressures [MPa].
         """
-        return np.asarray(np.interp(pressure, *self._places))
+        return np.asarray(np.interp(np.asarray(pressure, float), *self._places))
 
     @cached_property
     def _places(self) -> tuple[Array, Array]:
