@@ -68,7 +68,7 @@ class RepresentativeCoupling(Coupling):
         super().__init__(parts, comm, meshes, nodes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
         self._elsewhere: dict[str, tuple[Any, Any, Any]] = {}
-        self._in_proportion: dict[str, dict[tuple[float, float], Array]] = {}
+        self._in_proportion: dict[str, dict[tuple[Any, ...], Array]] = {}
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face
             with located(self.scene.file, "counter_body.contact"):

@@ -31,7 +31,6 @@ from patchlaw.geometry.sliders import MOST_REMEMBERED, SliderRecord
 from patchlaw.micro.half_space.error_probe import ZERO
 from patchlaw.micro.model import LEAST_CLOSING
 from patchlaw.multiscale.bodies.bodies import free_bodies
-from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -51,9 +50,7 @@ from patchlaw.support.readable import Caution
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
     from patchlaw.macro.contact.face_laws import Sampling
-    from patchlaw.macro.contact.law_problem import ApproachResponse, StepEnd
-
-    Ended = FaceEquilibrium | StepEnd
+    from patchlaw.macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
 """The causes, in their order."""
@@ -98,8 +95,8 @@ class LawErrorProbe(SampleProbe):
         new_laws: The laws of the samples before they wore; of new samples those of `table`.
         zero: Error of the height that approaches count from [mm].
         elsewhere: By name other faces of small bodies, each with laws and the problem there.
-        in_proportion: By cause, force and loads of the bodies errors of force, area, gap and
-            stiffness, over these and over the stiffness against the approach, shape (4,) [mm/N].
+        in_proportion: By cause, force and other loads errors of force, area, gap and stiffness,
+            over these and over the stiffness against the approach, shape (4,) [mm/N].
     """
 
     problem: LawContactProblem
@@ -111,7 +108,7 @@ class LawErrorProbe(SampleProbe):
     new_laws: Sequence[PatchLaw]
     zero: float = 0.0
     elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
-    in_proportion: dict[str, dict[tuple[float, float], Array]] = field(default_factory=dict)
+    in_proportion: dict[str, dict[tuple[Any, ...], Array]] = field(default_factory=dict)
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
     _read_under: dict[float, Array] = field(default_factory=dict, init=False)
 
@@ -230,7 +227,7 @@ class LawErrorProbe(SampleProbe):
         point = laws.at(sampling.patch, closure, extend=True)
         stiffness = mean(point.stiffness)
         if closing is not None:
-            closed = -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
+            closed = closing * point.closing
             rates = laws.interface_stiffness(point, sampling.patch)
             stiffness = mean(closed * rates) / max(mean(closed), LEAST_CLOSING)
         return np.array([mean(point.contact_area_fraction), mean(point.separation), stiffness])
@@ -323,10 +320,9 @@ class LawErrorProbe(SampleProbe):
             Collective.
         """
         points = self.answer + self.by_points()
-        if self.problem.sliders is None:
-            mesh = self._in_proportion("mesh", lambda: self._by_elements(points))
-        else:
-            mesh = self._by_elements(points)
+        measure = partial(self._by_elements, points)
+        rubs = self.problem.sliders is not None
+        mesh = measure() if rubs else self._in_proportion("mesh", measure)
         return mesh, np.abs(points - self.answer)
 
     def _by_elements(self, points: Array) -> Array:
@@ -358,20 +354,23 @@ class LawErrorProbe(SampleProbe):
         """Return errors by displacements in proportion to the pressures, measured once.
 
         Force, area and gap err by these in proportion to the stiffness besides. They are measured
-        again where the force is another one, and where the bodies are loaded otherwise. The shear
-        errs by the part that the force does, see `LawShearProbe`.
+        again where the force is another one, where bodies and plane are loaded otherwise, and where
+        pressures move as the face wears. The shear errs by the part that the force does, see
+        `LawShearProbe`.
 
         Args:
             kind: What displaces.
             measure: Returns the errors of the answer.
         """
         force, known = self.state.force, self.in_proportion.setdefault(kind, {})
-        sizes, state = self.response.stiffness * np.abs(self.answer[:4]), self.control.body_state
-        for (at, loaded), errors in known.items():
-            if loaded == state and max(at / force, force / at) <= _SAME_FORCE:
+        sizes, control = self.response.stiffness * np.abs(self.answer[:4]), self.control
+        state = control.body_state, control.tilt, control.moment
+        for (at, *loaded), errors in known.items():
+            same = tuple(loaded) == state and not self.worn
+            if same and max(at / force, force / at) <= _SAME_FORCE:
                 return np.append(errors * sizes, np.zeros(len(self.answer) - 4))
         errors = measure()
-        known[force, state] = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
+        known[force, *state] = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
         return errors
 
     @cached_property
@@ -479,21 +478,26 @@ class LawErrorProbe(SampleProbe):
         if not same:
             on.start_from_mesh(problem, self.state, self.problem.sampling)
         else:
-            on.start_from_elements(problem, self.state, self.face, control.body_state)
+            moved = on.carried(self.state.displacement, self.face, problem.face)
+            problem.start_at(moved, self.state.plane, control.body_state)
             more = problem.face.body.dofs - self.face.body.dofs
             if more > 0:
                 end = problem.first_order_step(control, self.problem, before)
                 return self._answer_of(end, problem, to)
             if more < 0:
                 return self._answer_of(problem.step_on_lines(control, self.problem), problem, to)
-        found = problem.solve(nearer_by(control, nearer))
+        if control.approach is not None:
+            control = replace(control, approach=control.approach + nearer)
+        found = problem.solve(control)
         return self._answer_of(found, problem, to if same else problem.approach_response())
 
     def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
         """Return what a problem on another face is solved under, and what was left behind there."""
         return self.control, None
 
-    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+    def _answer_of(
+        self, end: FaceEquilibrium, problem: LawContactProblem, to: ApproachResponse
+    ) -> Array:
         """Return what is compared at the end of a load step, shape (4,).
 
         It is the force at the approach of the run [N], to first order where the force is
@@ -520,18 +524,6 @@ class LawErrorProbe(SampleProbe):
         if self.worn:  # the laws are those of the nearest depths: at equal pressures
             closure = self._closures_under(problem.forces.pressure(closure), sampling.patch)
         return self._read_off(closure, sampling, problem.closing_with(to.way, moved))
-
-
-def nearer_by(control: Control, distance: float) -> Control:
-    """Return a control whose plane is nearer, where its approach is held.
-
-    Args:
-        control: The control.
-        distance: How much nearer it is [mm].
-    """
-    if control.approach is None:
-        return control
-    return replace(control, approach=control.approach + distance)
 
 
 def causes_of(samples: Sequence[RegionSamples]) -> list[str]:

@@ -54,10 +54,9 @@ from patchlaw.multiscale.models.measured_errors.shear import (
 from patchlaw.support import Array, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro.contact.face_equilibrium import FaceShear
+    from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
     from patchlaw.macro.contact.law_problem import ApproachResponse, LawContactProblem
-    from patchlaw.multiscale.models.measured_errors.faces import Ended
 
 
 _PARTS, _HALVED = 8, 4
@@ -203,7 +202,9 @@ class LawShearProbe(LawErrorProbe):
             problem.sliders.memory = replace(problem.sliders.memory, shift=shift)
         return control, self.before
 
-    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+    def _answer_of(
+        self, end: FaceEquilibrium, problem: LawContactProblem, to: ApproachResponse
+    ) -> Array:
         """Return what `LawErrorProbe` compares, the shear and the energy lost, shape (7,)."""
         shear = end.shear
         assert shear is not None
@@ -217,10 +218,6 @@ class LawShearProbe(LawErrorProbe):
             share = min(abs(change) / last, 1.0) * min(last / (_TELLS * whole), 1.0)
             change = math.copysign(max(abs(change), share * whole), change)
         return whole + change
-
-    def _answered(self, force: Array) -> Array:
-        """Return what a change of the shear force changes in the answer, shape (2,)."""
-        return force if self.by_shift else force / self._stiffness
 
     @property
     def _sliders(self) -> FaceSliders:
@@ -258,7 +255,8 @@ class LawShearProbe(LawErrorProbe):
         signed = np.sign(fine - whole) * stress
         further = np.column_stack([np.zeros(len(signed)), signed])
         force, shear = self.problem.changed_by(further)
-        return np.array([abs(force), *np.zeros(3), *np.abs(self._answered(shear)), lost])
+        along = np.abs(shear if self.by_shift else shear / self._stiffness)
+        return np.array([abs(force), *np.zeros(3), *along, lost])
 
     def _whole(self, gone: Callable[[int], tuple[Array, float]]) -> tuple[Array, float]:
         """Return the stresses and the energy lost that whole load steps lead to.
@@ -369,11 +367,9 @@ class LawShearProbe(LawErrorProbe):
     @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
-        laws = self.table.laws
-        paths = [self._path_of(*one, self._points) for one in enumerate(laws)]
-        pressed = self._only_pressed(paths)
-        if pressed:
-            paths = [self._path_of(*one, self._points[-1:]) for one in enumerate(laws)]
+        paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+        if pressed := self._only_pressed(paths):
+            paths = [path[-1:] for path in paths]
         errors = np.zeros((7, len(self.samples)))
         tell = partial(self._of_sample, paths=paths, pressed=pressed)
         for number, own, areas in self.of_regions("check of friction", tell, paths):
@@ -391,12 +387,12 @@ class LawShearProbe(LawErrorProbe):
             for reached in path
         )
 
-    def _path_of(self, number: int, law: PatchLaw, points: Sequence[_Point]) -> list[_Reached]:
+    def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
         mu, one = self.samples[number].coefficient, np.zeros(1, np.intp)
         sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
         path, state, lost = list[_Reached](), sliders.at_rest, 0.0
-        for point in points:
+        for point in self._points:
             closure, slip = point.closure[number : number + 1], point.slip[number]
             if not np.isfinite(closure[0]):
                 path, state, lost = [], sliders.at_rest, 0.0

@@ -169,10 +169,11 @@ def test_a_plane_that_does_not_touch_has_no_error(mesh):
 def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     block = {**CONSTANTS, "cells": CELLS, "lengths": [1.1, 0.9], "height": 0.8}
     step = run(scene(mesh, block=block)).steps[-1]
+    found, own = dict(all_measured.steps[-1].errors), dict(step.errors)
+    # in proportion from the first load step, at 0.4 of the force
+    assert found.pop("mesh") == pytest.approx(own.pop("mesh"), rel=0.05)
     # differences of two forces, each solved for to 1e-8
-    assert dict(all_measured.steps[-1].errors) == pytest.approx(
-        dict(step.errors), rel=1e-6, abs=2e-8 * step.force_N
-    )
+    assert found == pytest.approx(own, rel=1e-6, abs=2e-8 * step.force_N)
 
 
 def test_the_error_of_a_mean_holds_in_19_of_20_sets():
@@ -339,7 +340,7 @@ def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monk
     assert not whole.coupling._elsewhere
     monkeypatch.setattr(law_errors, "_MOST_KEPT_UNKNOWNS", 0)
     fresh = run(known).steps
-    assert len(made) == 2 + 2 * len(fresh)
+    assert len(made) == 2 + len(fresh) + 1  # quadratic elements tell those of both load steps
     for one, other in zip(kept, fresh, strict=True):
         abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
         assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
