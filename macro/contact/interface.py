@@ -22,12 +22,7 @@ from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_laws import crown_depth
-from patchlaw.macro.contact.face_leak import (
-    Axes,
-    FaceLeak,
-    LeakingFace,
-    face_leak,
-)
+from patchlaw.macro.contact.face_leak import Axes, FaceLeak, LeakingFace, face_leak
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,

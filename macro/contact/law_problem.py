@@ -20,11 +20,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.geometry import Control, Friction, RigidPlane, ShearControl
-from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
@@ -69,6 +68,7 @@ class ApproachResponse(NamedTuple):
         sampling: The samples.
         moved: Displacements of the body with the approach, a vector of PETSc.
         way: What motions of the plane, 1, x − xc and y − yc, go with it, shape (3,).
+        iterations: Linear iterations that it took.
     """
 
     stiffness: float
@@ -77,6 +77,7 @@ class ApproachResponse(NamedTuple):
     sampling: Sampling
     moved: PETSc.Vec
     way: Array
+    iterations: int
 
     def force_changes(self, pressures: Array) -> Array:
         """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
@@ -88,22 +89,6 @@ class ApproachResponse(NamedTuple):
             Collective.
         """
         return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
-
-
-class StepEnd(NamedTuple):
-    """How a load step ends, to first order; under the same names as of a `FaceEquilibrium`.
-
-    Attributes:
-        approach: The approach [mm].
-        force: The force [N].
-        shear: The shear; None without friction.
-        sample_closure: Closures of this rank's samples, shape (n,) [mm].
-    """
-
-    approach: float
-    force: float
-    shear: FaceShear | None
-    sample_closure: Array
 
 
 class LawContactProblem:
@@ -167,7 +152,7 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
         # at the latest equilibrium, which its closures tell from others
-        self._closed: tuple[Array, Array, PETSc.Vec] | None = None
+        self._response: ApproachResponse | None = None
         self._tangential: tuple[tuple[Array, SliderRecord], tuple[float, int]] | None = None
 
     def solve(self, control: Control, wearing: Array | None = None) -> FaceEquilibrium:
@@ -393,15 +378,14 @@ class LawContactProblem:
         return replace(control, approach=approach, force=None, tilt=tilt)
 
     @contextmanager
-    def _plane_held(self) -> Iterator[Control]:
-        """Let the plane stay where it is, without shear; yield what was prescribed."""
-        control, (approach, *slopes) = self.forces.control, map(float, self._plane)
-        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
-        self.forces.prescribe(held, self._plane)
+    def _prescribed(self, control: Control) -> Iterator[None]:
+        """Let something be prescribed of the latest plane for a while."""
+        known = self.forces.control
+        self.forces.prescribe(control, self._plane)
         try:
-            yield control
+            yield
         finally:
-            self.forces.prescribe(control, self._plane)
+            self.forces.prescribe(known, self._plane)
 
     def approach_response(self) -> ApproachResponse:
         """Return what the latest equilibrium changes with the approach, to first order.
@@ -412,14 +396,21 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve.
+            Collective; one linear solve, and none where it is known.
         """
+        if self._response is None or self._response.closure is not self._closure:
+            with self._prescribed(self._with_pulls(self.same_approach())):
+                self._response = self._approached()
+        return self._response
+
+    def _approached(self) -> ApproachResponse:
         forces, sampling, closure = self.forces, self.sampling, self._closure
-        forces.prescribe(self._with_pulls(self.same_approach()), self._plane)
-        stiffness, known = self._linearised(), self._closed
-        if known is None or known[0] is not closure or forces.control.tilt is None:
-            known = closure, *self._closed_in(np.ones_like(sampling.weight))[:2]
-        _, change, moved = known
+        stiffness, load = self._linearised(), self.equilibrium.matrix.createVecLeft()
+        sampling.values.array[:] = risen = forces.pressure_change(sampling.weight)
+        sampling.operator.mult(sampling.values, load)
+        moved, iterations = self._moved_by(load, _LINEAR)
+        change = forces.pressure_change(sampling.weight * sampling.displacements(moved))
+        change = risen - change
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         way = np.array([1.0, 0.0, 0.0])
         if forces.control.tilt is None:  # the plane turns so that closures change as they do
@@ -429,42 +420,11 @@ class LawContactProblem:
             sums = forces.levers.summed(levers.T @ (sampling.weight[stiffness > 0.0] * turned))
             way[1:] = np.linalg.lstsq(matrix, sums[1:], rcond=1e-12)[0]
         whole = float(forces.loads(change)[0])
-        return ApproachResponse(whole, closing, closure, sampling, moved, way)
-
-    def approach_rates(self) -> tuple[Array, float, int]:
-        """Return changes of this rank's closures with the approach, (n,), and dF/dδ [N/mm].
-
-        The last is the number of linear iterations.
-
-        Closures of samples without pressure count as well. The plane turns where it was free to,
-        so that moments stay.
-
-        Raises:
-            NotConverged: When a linear solve fails.
-
-        Note:
-            Collective; one linear solve, and two more where the plane turns.
-        """
-        with self._plane_held() as control:
-            self._linearised()
-            turns = control.tilt is None
-            levers = self.forces.levers.matrix[:, : 3 if turns else 1]
-            closing = np.empty_like(levers)
-            loads, iterations = np.zeros((3, 3)), 0
-            for k, way in enumerate(levers.T):
-                change, moved, used = self._closed_in(way)
-                if k == 0:
-                    self._closed = self._closure, change, moved
-                iterations += used
-                closing[:, k] = way - self.sampling.displacements(moved)
-                loads[:, k] = self.forces.loads(change)
-            motion = way_of_approach(loads, turns=turns)
-            changes = np.asarray(closing @ motion[: levers.shape[1]])
-            return changes, float(loads[0] @ motion), iterations
+        return ApproachResponse(whole, closing, closure, sampling, moved, way, iterations)
 
     def first_order_step(
         self, control: Control, lower: LawContactProblem, before: SliderRecord | None
-    ) -> StepEnd:
+    ) -> FaceEquilibrium:
         """Return how a load step ends, to first order from the latest guess.
 
         Args:
@@ -484,7 +444,7 @@ class LawContactProblem:
         guess.axpy(-1.0, moved)
         return self._end_on(self._lines_at(closure), guess)
 
-    def step_on_lines(self, control: Control, other: LawContactProblem) -> StepEnd:
+    def step_on_lines(self, control: Control, other: LawContactProblem) -> FaceEquilibrium:
         """Return how a load step ends on fewer unknowns, to first order from where it ended.
 
         Laws and sliders are lines at the closures and slips of the same samples there.
@@ -515,7 +475,7 @@ class LawContactProblem:
     def _lines_at(self, closure: Array) -> Lines:
         return Lines(closure, self.forces.pressure(closure), self.forces.stiffness(closure))
 
-    def _end_on(self, lines: Lines, at: PETSc.Vec) -> StepEnd:
+    def _end_on(self, lines: Lines, at: PETSc.Vec) -> FaceEquilibrium:
         """Return how a load step ends at displacements on laws that are lines."""
         forces, shear = self.forces, None
         closure = forces.closure_on_lines(self.sampling.displacements(at), lines)
@@ -525,7 +485,7 @@ class LawContactProblem:
             found = self.sliders.respond(closure, forces.along(at), pressed, lines.stiffness)
             shear = self.sliders.step(found)[1]
         force = float(forces.loads(pressure)[0])
-        return StepEnd(float(forces.plane[0]), force, shear, closure)
+        return replace(forces.state(closure, shear=shear), force=force)
 
     def _beyond_linear(
         self, control: Control, lower: LawContactProblem
@@ -570,20 +530,15 @@ class LawContactProblem:
             control: What it prescribed.
             load: The load.
         """
-        forces, sliders, closure, found = self.forces, self.sliders, self._closure, None
-        memory, known = None if sliders is None else sliders.memory, forces.control
-        forces.prescribe(self._with_pulls(control), self._plane)
-        try:
-            if sliders is not None and before is not None:
-                at, slip = self._lines_at(closure), sliders.memory.path[:, -1, 1:]
-                sliders.restore(before)
-                found = sliders.at_slip(*at, slip)
+        sliders, found = self.sliders, None
+        if sliders is not None and before is not None:
+            at, memory = self._lines_at(self._closure), sliders.memory
+            sliders.restore(before)
+            found = sliders.at_slip(*at, memory.path[:, -1, 1:])
+            sliders.memory = memory
+        with self._prescribed(self._with_pulls(control)):
             self._linearised(found)
             return self._moved_by(load, _OF_CHANGE)[0]
-        finally:
-            if sliders is not None and memory is not None:
-                sliders.memory = memory
-            forces.prescribe(known, self._plane)
 
     def changed_by(self, stresses: Array) -> tuple[float, Array]:
         """Return what further stresses change at the latest equilibrium, to first order.
@@ -602,7 +557,8 @@ class LawContactProblem:
         Note:
             Collective; one linear solve.
         """
-        with self._plane_held():
+        approach, *slopes = map(float, self._plane)
+        with self._prescribed(Control(approach=approach, tilt=(slopes[0], slopes[1]))):
             self._rubbing.hold_shift()
             self._linearised(self._slipping_as_plane())
             change, _, _ = self._stressed(stresses[:, 0], stresses[:, 1:])
@@ -672,21 +628,6 @@ class LawContactProblem:
         self.forces.linearise(stiffness, found)
         self._preconditioner.update()
         return stiffness
-
-    def _closed_in(self, way: Array) -> tuple[Array, PETSc.Vec, int]:
-        """Return what it changes that samples close in by some lengths [mm].
-
-        Returns:
-            The change of pressures, (n,), the displacements, and the linear iterations.
-        """
-        forces, sampling = self.forces, self.sampling
-        load = self.equilibrium.matrix.createVecLeft()
-        risen = forces.pressure_change(sampling.weight * way)
-        sampling.values.array[:] = risen
-        sampling.operator.mult(sampling.values, load)
-        moved, iterations = self._moved_by(load, _LINEAR)
-        change = forces.pressure_change(sampling.weight * sampling.displacements(moved))
-        return np.asarray(risen - change), moved, iterations
 
     def _stressed(self, pressure: Array, shear: Array) -> tuple[Array, PETSc.Vec, int]:
         """Return what stresses beside those of the laws change: all stresses, shape (n, 3) [MPa].

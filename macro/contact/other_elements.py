@@ -174,24 +174,6 @@ def _tags_of(body: MeshedBody, facets: ContactFacets) -> Locals:
     return np.asarray(tags.values[place])
 
 
-def start_from_elements(
-    problem: LawContactProblem, known: FaceEquilibrium, before: ContactFace, body_state: float = 0.0
-) -> None:
-    """Take the solution on some elements for the latest one of a problem on others.
-
-    Args:
-        problem: The problem.
-        known: A solution.
-        before: The face that it is of.
-        body_state: Position among the states of the bodies' loads there.
-
-    Note:
-        Collective.
-    """
-    displacement = carried(known.displacement, before, problem.face)
-    problem.start_at(displacement, known.plane, body_state)
-
-
 def start_from_mesh(problem: LawContactProblem, known: FaceEquilibrium, sampling: Sampling) -> None:
     """Take the displacements by pressures on another mesh for the latest solution of a problem.
 

@@ -54,6 +54,11 @@ class LawPoint(NamedTuple):
         """Derivative of the pressure over the closure [MPa/mm]."""
         return np.asarray(self.dpressure / np.maximum(self.dclosure, LEAST_SLOPE))
 
+    @property
+    def closing(self) -> Array:
+        """Derivative of the mean gap over the closure, against its sign."""
+        return np.asarray(-self.dseparation / np.maximum(self.dclosure, LEAST_SLOPE))
+
 
 @dataclass(frozen=True, eq=False)
 class LawCurves:

@@ -20,6 +20,9 @@ from patchlaw.multiscale.laws.rows import LawRows, Transmissivity, Untouched
 from patchlaw.support import Array, Indices, InputError
 from patchlaw.support.readable import Displayed, Table, column, of_columns, span, spread
 
+_PLACES = np.union1d(np.linspace(0.0, 1.0, 401), np.geomspace(1e-12, 1.0, 361))
+"""Places on a law, as shares of its range, that its closure under a pressure is read off between:
+close to each other near first touch, where pressures are powers of the closure."""
 ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure or approach may exceed it."""
 
@@ -163,6 +166,21 @@ class PatchLaw(Displayed):
         closures with `at`.
         """
         return self.at(closure, extend=True).pressure
+
+    def closure_under(self, pressure: ArrayLike) -> Array:
+        """Return the closures under pressures of any shape, at most the last one [mm].
+
+        Args:
+            pressure: The pressures [MPa].
+        """
+        return np.asarray(np.interp(np.asarray(pressure, float), *self._places))
+
+    @cached_property
+    def _places(self) -> tuple[Array, Array]:
+        """Pressures and closures that `closure_under` reads off between."""
+        start, end = self.range
+        closures = start + (end - start) * _PLACES
+        return self.pressure(closures), closures
 
     def stiffness(self, closure: ArrayLike) -> Array:
         """Return the derivative of `pressure` over the closure [MPa/mm]."""

@@ -16,7 +16,7 @@ import scipy
 from patchlaw.geometry import Control, PatchGrid, ShearControl
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
-from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
+from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.worn_laws import RunningInLaws
 from patchlaw.multiscale.loading.load_step import CLEAR, LoadStep, PatchState
@@ -86,15 +86,6 @@ class FaceContact(LawModel):
             ValueError: Before the first load step.
         """
         return self._problem, self._known
-
-    @property
-    def displacement(self) -> Array:
-        """This rank's displacements at the latest load step; earlier ones are not kept [mm].
-
-        Raises:
-            ValueError: Before the first load step.
-        """
-        return self._known.displacement
 
     @property
     def point_pressures(self) -> Array:
@@ -178,7 +169,7 @@ class FaceContact(LawModel):
             first: Any = self.face.sides[0]
             mesh, points = first.body.mesh.mesh, first.quadrature
             further.append(point_field(mesh, "worn_depth", points, self.point_worn_depths))
-        return (self.displacement, step.body_state), shown, further
+        return (self._known.displacement, step.body_state), shown, further
 
     def field_record(self, state: Any) -> Array:
         """Return the stresses and closures of the samples of all ranks, with their places."""
@@ -226,8 +217,7 @@ class FaceContact(LawModel):
     @property
     def meshed_bodies(self) -> list[Any]:
         """The body, and the counter-body where that is a mesh."""
-        body: Any = self.face.body
-        return [body.body, body.counter] if hasattr(body, "counter") else [body]
+        return [one.body for one in self.face.sides]
 
     @property
     def unknowns(self) -> int:
@@ -367,25 +357,19 @@ class FaceContact(LawModel):
         } | ({} if rubs is None else {"dissipated_mJ": float(np.sum(rubs * self._slid.forces))})
 
     def stiffness(self) -> NormalStiffness:
-        """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""
+        """Return −dF/dū and dF/dδ at the latest load step, by one linear solve."""
         try:
-            closing, forces, iterations = self._problem.approach_rates()
+            to = self._problem.approach_response()
         except NotConverged as error:
             return NormalStiffness(iterations=error.iterations)
-
-        def closed(point: LawPoint) -> Array:
-            return -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
-
-        def whole(rate: Callable[[Indices, LawPoint], Array]) -> float:
-            means = self._problem.patch_means(lambda *at: rate(at[0], self._at(*at)))
-            return float(means @ self.face.areas)
-
-        area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
-        rates = self._laws.interface_stiffness
-        own = whole(lambda patch, point: closed(point) * rates(point, patch))
+        sampling, area = self._problem.sampling, float(self.face.areas.sum())
+        point = self._at(sampling.patch, self._known.sample_closure, extend=True)
+        closed = point.closing * self._problem.closing_with(to.way, to.moved.array_r)
+        rates = closed * self._laws.interface_stiffness(point, sampling.patch)
+        gaps, own = (float(sampling.patch_sums(one).sum()) for one in (closed, rates))
         if not gaps > LEAST_CLOSING * area:  # near full contact the mean gap hardly closes
-            return NormalStiffness(None, forces, iterations)
-        return NormalStiffness(area * own / gaps, forces, iterations)
+            return NormalStiffness(None, to.stiffness, to.iterations)
+        return NormalStiffness(area * own / gaps, to.stiffness, to.iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
         return np.asarray(self._laws.interface_stiffness(self._at(patch, closure), patch))

@@ -31,7 +31,6 @@ from patchlaw.geometry.sliders import MOST_REMEMBERED, SliderRecord
 from patchlaw.micro.half_space.error_probe import ZERO
 from patchlaw.micro.model import LEAST_CLOSING
 from patchlaw.multiscale.bodies.bodies import free_bodies
-from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -39,7 +38,6 @@ from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
     SampleProbe,
-    closure_under,
     interpolation_errors,
     mean_error,
 )
@@ -52,9 +50,7 @@ from patchlaw.support.readable import Caution
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
     from patchlaw.macro.contact.face_laws import Sampling
-    from patchlaw.macro.contact.law_problem import ApproachResponse, StepEnd
-
-    Ended = FaceEquilibrium | StepEnd
+    from patchlaw.macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
 """The causes, in their order."""
@@ -72,6 +68,11 @@ _BY_CREASES, _MOST_KEPT_UNKNOWNS = 3e-3, 20_000
 have so many unknowns at most; other elements with so many are kept for later load steps. Creases
 between the facets of a faceted side disturb a uniform stress by 1e-4 to 1e-3 in places that no
 degree of elements resolves on the same mesh."""
+_LINE = 1e-3
+"""Share of the pressures up to which what is read off laws changes in proportion."""
+_SAME_FORCE = 5.0
+"""Ratio of forces up to which displacements by elements are in proportion to them: over four times
+the force they grew by 4, 0 and 11 % more on three drawn pads, those of creases by 20 %."""
 _TOLD = 0.57
 """Memory of the products that tell the error of linear elements over that of a solve: 1230 of 2150
 B an unknown of a cube of 73,167 (Q2), 740 of 1610 of 151,959 (P2)."""
@@ -94,6 +95,8 @@ class LawErrorProbe(SampleProbe):
         new_laws: The laws of the samples before they wore; of new samples those of `table`.
         zero: Error of the height that approaches count from [mm].
         elsewhere: By name other faces of small bodies, each with laws and the problem there.
+        in_proportion: By cause, force and other loads errors of force, area, gap and stiffness,
+            over these and over the stiffness against the approach, shape (4,) [mm/N].
     """
 
     problem: LawContactProblem
@@ -105,7 +108,9 @@ class LawErrorProbe(SampleProbe):
     new_laws: Sequence[PatchLaw]
     zero: float = 0.0
     elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
+    in_proportion: dict[str, dict[tuple[Any, ...], Array]] = field(default_factory=dict)
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
+    _read_under: dict[float, Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def control(self) -> Control:
@@ -187,21 +192,20 @@ class LawErrorProbe(SampleProbe):
         errors = np.array([share, share / self._gaps_by, share])
         if not math.isfinite(share) or not share:
             return errors
-        known, sizes = self._as_read, np.ones(3)
-        moved = np.max([abs(self._under(1.0 + by) - known) for by in (share, -share)], axis=0)
+        known, sizes, by = self._under(1.0), np.ones(3), max(share, _LINE)
+        moved = np.max([abs(self._under(1.0 + one) - known) for one in (by, -by)], axis=0)
         sizes[::2] = known[::2]
-        moved = np.divide(moved, sizes, out=errors.copy(), where=sizes > 0.0)
+        moved = np.divide(share / by * moved, sizes, out=errors.copy(), where=sizes > 0.0)
         return np.array([min(share, moved[0]), *np.maximum(errors, moved)[1:]])
-
-    @cached_property
-    def _as_read(self) -> Array:
-        return self._under(1.0)
 
     def _under(self, times: float) -> Array:
         """Return what `_read_off` returns under so many times the pressures; collective."""
-        sampling = self.problem.sampling
-        pressure = max(times, 0.0) * self.state.sample_pressure
-        return self._read_off(self._closures_under(pressure, sampling.patch), sampling)
+        if times not in self._read_under:
+            sampling = self.problem.sampling
+            pressure = max(times, 0.0) * self.state.sample_pressure
+            closure = self._closures_under(pressure, sampling.patch)
+            self._read_under[times] = self._read_off(closure, sampling)
+        return self._read_under[times]
 
     def _read_off(self, closure: Array, sampling: Sampling, closing: Array | None = None) -> Array:
         """Return area, gap [mm] and stiffness [MPa/mm] by the laws, shape (3,).
@@ -223,7 +227,7 @@ class LawErrorProbe(SampleProbe):
         point = laws.at(sampling.patch, closure, extend=True)
         stiffness = mean(point.stiffness)
         if closing is not None:
-            closed = -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
+            closed = closing * point.closing
             rates = laws.interface_stiffness(point, sampling.patch)
             stiffness = mean(closed * rates) / max(mean(closed), LEAST_CLOSING)
         return np.array([mean(point.contact_area_fraction), mean(point.separation), stiffness])
@@ -274,7 +278,7 @@ class LawErrorProbe(SampleProbe):
 
     def _closures_under(self, pressure: Array, patch: Indices) -> Array:
         """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
-        return self._by_law(closure_under, pressure, patch)
+        return self._by_law(PatchLaw.closure_under, pressure, patch)
 
     def _by_law(
         self, function: Callable[[PatchLaw, Array], Array], values: Array, patch: Indices
@@ -315,10 +319,21 @@ class LawErrorProbe(SampleProbe):
         Note:
             Collective.
         """
+        points = self.answer + self.by_points()
+        measure = partial(self._by_elements, points)
+        rubs = self.problem.sliders is not None
+        mesh = measure() if rubs else self._in_proportion("mesh", measure)
+        return mesh, np.abs(points - self.answer)
+
+    def _by_elements(self, points: Array) -> Array:
+        """Return the errors by elements.
+
+        Args:
+            points: The answer with a finer quadrature.
+        """
         from patchlaw.macro.contact import other_elements as on
 
         own, known = on.bodies_of(self.face), self.answer
-        points = known + self.by_points()
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
             linear = partial(on.face_on, choose=lambda b: b.linear if b.degree == 2 else b)
@@ -326,11 +341,37 @@ class LawErrorProbe(SampleProbe):
         if any(body.degree == 1 for body in own):
             error, quadratic = self._of_linear(points)
             mesh, below = mesh + error, np.abs(quadratic - points)
-        if mesh[0] < _BY_CREASES * abs(known[0]) and 8 * self._most <= _MOST_KEPT_UNKNOWNS:
-            # creases, by quadratic elements on cells cut into eight
-            if (found := self._answer_of_kind("cut", on.refined_face, same=False)) is not None:
-                mesh = np.maximum(mesh, below + OF_REFINED * np.abs(found - quadratic))
-        return mesh, np.abs(points - known)
+        if mesh[0] >= _BY_CREASES * abs(known[0]) or 8 * self._most > _MOST_KEPT_UNKNOWNS:
+            return mesh
+
+        def by_creases() -> Array:  # by quadratic elements on cells cut into eight
+            found = self._answer_of_kind("cut", on.refined_face, same=False)
+            return np.zeros_like(known) if found is None else np.abs(found - quadratic)
+
+        return np.maximum(mesh, below + OF_REFINED * self._in_proportion("creases", by_creases))
+
+    def _in_proportion(self, kind: str, measure: Callable[[], Array]) -> Array:
+        """Return errors by displacements in proportion to the pressures, measured once.
+
+        Force, area and gap err by these in proportion to the stiffness besides. They are measured
+        again where the force is another one, where bodies and plane are loaded otherwise, and where
+        pressures move as the face wears. The shear errs by the part that the force does, see
+        `LawShearProbe`.
+
+        Args:
+            kind: What displaces.
+            measure: Returns the errors of the answer.
+        """
+        force, known = self.state.force, self.in_proportion.setdefault(kind, {})
+        sizes, control = self.response.stiffness * np.abs(self.answer[:4]), self.control
+        state = control.body_state, control.tilt, control.moment
+        for (at, *loaded), errors in known.items():
+            same = tuple(loaded) == state and not self.worn
+            if same and max(at / force, force / at) <= _SAME_FORCE:
+                return np.append(errors * sizes, np.zeros(len(self.answer) - 4))
+        errors = measure()
+        known[force, *state] = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
+        return errors
 
     @cached_property
     def _most(self) -> int:
@@ -437,21 +478,26 @@ class LawErrorProbe(SampleProbe):
         if not same:
             on.start_from_mesh(problem, self.state, self.problem.sampling)
         else:
-            on.start_from_elements(problem, self.state, self.face, control.body_state)
+            moved = on.carried(self.state.displacement, self.face, problem.face)
+            problem.start_at(moved, self.state.plane, control.body_state)
             more = problem.face.body.dofs - self.face.body.dofs
             if more > 0:
                 end = problem.first_order_step(control, self.problem, before)
                 return self._answer_of(end, problem, to)
             if more < 0:
                 return self._answer_of(problem.step_on_lines(control, self.problem), problem, to)
-        found = problem.solve(nearer_by(control, nearer))
+        if control.approach is not None:
+            control = replace(control, approach=control.approach + nearer)
+        found = problem.solve(control)
         return self._answer_of(found, problem, to if same else problem.approach_response())
 
     def load_step(self, problem: LawContactProblem) -> tuple[Control, SliderRecord | None]:
         """Return what a problem on another face is solved under, and what was left behind there."""
         return self.control, None
 
-    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+    def _answer_of(
+        self, end: FaceEquilibrium, problem: LawContactProblem, to: ApproachResponse
+    ) -> Array:
         """Return what is compared at the end of a load step, shape (4,).
 
         It is the force at the approach of the run [N], to first order where the force is
@@ -478,18 +524,6 @@ class LawErrorProbe(SampleProbe):
         if self.worn:  # the laws are those of the nearest depths: at equal pressures
             closure = self._closures_under(problem.forces.pressure(closure), sampling.patch)
         return self._read_off(closure, sampling, problem.closing_with(to.way, moved))
-
-
-def nearer_by(control: Control, distance: float) -> Control:
-    """Return a control whose plane is nearer, where its approach is held.
-
-    Args:
-        control: The control.
-        distance: How much nearer it is [mm].
-    """
-    if control.approach is None:
-        return control
-    return replace(control, approach=control.approach + distance)
 
 
 def causes_of(samples: Sequence[RegionSamples]) -> list[str]:

@@ -40,13 +40,11 @@ _KNOWN = 13
 """Numbers that a sample on its cells tells: two errors of the force, the width at edges, the force;
 errors of what is read off by cells and by slopes, three each; what is read off under the mean
 pressure. Of gaps they are over that of the law."""
-_ROUNDED = 1.001
-"""Ratio of pressures that samples are solved under, so that load steps under the same pressure
-share what they tell. Errors jump where one cell more is touched: that of the area of a worn contact
-was 12 to 15 % less with 1.005, 1.05 and 1.2 than with 1.001, 1.002, 1.02 and none."""
-_PLACES = np.union1d(np.linspace(0.0, 1.0, 401), np.geomspace(1e-12, 1.0, 361))
-"""Places on a law, as shares of its range, that its closure under a pressure is read off between:
-close to each other near first touch, where pressures are powers of the closure."""
+_ROUNDED, _OF_EDGES = 1.001, 1.25
+"""Ratios of pressures that samples and their edges are solved under, so that load steps under about
+the same pressure share what they tell. Errors jump where one cell more is touched: that of the area
+of a worn contact was 12 to 15 % less with 1.005, 1.05 and 1.2 than with 1.001, 1.002, 1.02 and
+none. Widths at edges change by less than their own square root of the pressure."""
 _RESIDUAL = 1e-5
 """Residual of the contacts of samples whose errors are measured, as of those that tell these."""
 _LEAST_SEPARATION = 1e-3
@@ -64,6 +62,7 @@ class SampleCells:
 
     Attributes:
         told: What the samples of a region tell, and their areas, by their law and its closure.
+        widths: Widths at edges by the law of a region and its closure [mm].
         ends: By what tells cells from others, the last two ends of paths in shear that were gone on
             them, each with the way to it.
         forces: Forces of samples at approaches without shear, by region, sample and approach [N].
@@ -73,6 +72,7 @@ class SampleCells:
     finite_slopes: bool
     has_edges: bool
     told: dict[Hashable, tuple[Array, Array]] = field(default_factory=dict, init=False)
+    widths: dict[Hashable, float] = field(default_factory=dict, init=False)
     ends: dict[Hashable, list[tuple[list[Control], Any]]] = field(default_factory=dict, init=False)
     forces: dict[Hashable, float] = field(default_factory=dict, init=False)
 
@@ -135,11 +135,14 @@ class SampleCells:
         """
         if not self.has_edges:
             return 0.0
-        try:
-            model = self._flat_model(region, sample)
-            return edge_width(model, law, closure, region.materials.first)
-        except NotConverged:
-            return math.inf
+        at = law, _rounded(law, closure, _OF_EDGES)
+        if at not in self.widths:
+            try:
+                model = self._flat_model(region, sample)
+                self.widths[at] = edge_width(model, *at, region.materials.first)
+            except NotConverged:
+                self.widths[at] = math.inf
+        return self.widths[at]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -287,25 +290,13 @@ class SampleProbe:
         return np.array([nearer * float(law.stiffness(closure)) * surface.area, area, gap])
 
 
-def _rounded(law: PatchLaw, closure: float) -> float:
-    """Return the closure nearest to a law's [mm] with its largest pressure over `_ROUNDED`ⁿ."""
+def _rounded(law: PatchLaw, closure: float, ratio: float = _ROUNDED) -> float:
+    """Return the closure nearest to a law's [mm] with its largest pressure over a power of one."""
     pressure, largest = law.pressure(np.array([closure, law.range[1]])).tolist()
     if not pressure:
         return closure
-    power = _ROUNDED ** round(math.log(pressure / largest, _ROUNDED))
-    return float(closure_under(law, np.array(largest * power)))
-
-
-def closure_under(law: PatchLaw, pressure: Array) -> Array:
-    """Return the closures of a law under pressures of any shape, at most its last one [mm].
-
-    Args:
-        law: The law.
-        pressure: The pressures [MPa].
-    """
-    start, end = law.range
-    closures = start + (end - start) * _PLACES
-    return np.asarray(np.interp(pressure, law.pressure(closures), closures))
+    power = ratio ** round(math.log(pressure / largest, ratio))
+    return float(law.closure_under(largest * power))
 
 
 def _gap(law: PatchLaw, closure: float) -> float:

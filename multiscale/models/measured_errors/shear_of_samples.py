@@ -40,7 +40,7 @@ from patchlaw.micro.half_space.error_probe import ErrorProbe, coarser
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.faces import LawErrorProbe
-from patchlaw.multiscale.models.measured_errors.samples import closure_under, separation_of
+from patchlaw.multiscale.models.measured_errors.samples import separation_of
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -54,10 +54,9 @@ from patchlaw.multiscale.models.measured_errors.shear import (
 from patchlaw.support import Array, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro.contact.face_equilibrium import FaceShear
+    from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
     from patchlaw.macro.contact.law_problem import ApproachResponse, LawContactProblem
-    from patchlaw.multiscale.models.measured_errors.faces import Ended
 
 
 _PARTS, _HALVED = 8, 4
@@ -78,8 +77,9 @@ step in which almost everything sticks may lose all of it or nothing."""
 _RESIDUAL, _OF_PRESSURES = 3e-3, 3e-4
 """Residuals of tractions and of pressures on the cells of samples: shift and energy lost of 32² and
 128² cells differed by 0.2 and 0.4 % at most from those with 1e-5 and 1e-8."""
-_SLIDES = 1.0 - 1e-6
-"""Shear stress over μ times the pressure from which on a law slides: cells do so under it, too."""
+_SLIDES, _STICKS = 1.0 - 1e-6, 0.02
+"""Shear stress over μ times the pressure from which on a law slides: cells do so under it, too; and
+up to which mean stresses that leave no shear force are those of the pressing alone."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -197,9 +197,14 @@ class LawShearProbe(LawErrorProbe):
         (control,) = parted_path([self.step])
         assert problem.sliders is not None
         problem.sliders.restore(self.before, near=True)
+        if not self.by_shift:  # the search for the shift begins where it ended
+            shift = np.array(self._shear.shift)
+            problem.sliders.memory = replace(problem.sliders.memory, shift=shift)
         return control, self.before
 
-    def _answer_of(self, end: Ended, problem: LawContactProblem, to: ApproachResponse) -> Array:
+    def _answer_of(
+        self, end: FaceEquilibrium, problem: LawContactProblem, to: ApproachResponse
+    ) -> Array:
         """Return what `LawErrorProbe` compares, the shear and the energy lost, shape (7,)."""
         shear = end.shear
         assert shear is not None
@@ -213,10 +218,6 @@ class LawShearProbe(LawErrorProbe):
             share = min(abs(change) / last, 1.0) * min(last / (_TELLS * whole), 1.0)
             change = math.copysign(max(abs(change), share * whole), change)
         return whole + change
-
-    def _answered(self, force: Array) -> Array:
-        """Return what a change of the shear force changes in the answer, shape (2,)."""
-        return force if self.by_shift else force / self._stiffness
 
     @property
     def _sliders(self) -> FaceSliders:
@@ -254,7 +255,8 @@ class LawShearProbe(LawErrorProbe):
         signed = np.sign(fine - whole) * stress
         further = np.column_stack([np.zeros(len(signed)), signed])
         force, shear = self.problem.changed_by(further)
-        return np.array([abs(force), *np.zeros(3), *np.abs(self._answered(shear)), lost])
+        along = np.abs(shear if self.by_shift else shear / self._stiffness)
+        return np.array([abs(force), *np.zeros(3), *along, lost])
 
     def _whole(self, gone: Callable[[int], tuple[Array, float]]) -> tuple[Array, float]:
         """Return the stresses and the energy lost that whole load steps lead to.
@@ -312,7 +314,7 @@ class LawShearProbe(LawErrorProbe):
             ):
                 here = float(law.pressure(max(closure, law.range[0])))
                 pressures = np.array([here / factor, here])
-                there, before = law.stiffness(closure_under(law, pressures))
+                there, before = law.stiffness(law.closure_under(pressures))
                 found.append(factor * there / before if here > 0.0 < before else 1.0)
             yield np.maximum(found, 0.1)
 
@@ -359,18 +361,31 @@ class LawShearProbe(LawErrorProbe):
             if new is law:
                 found.append(at)
                 continue
-            found.append(closure_under(law, new.pressure(at)))
+            found.append(law.closure_under(new.pressure(at)))
         return np.array(found)
 
     @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
         paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+        if pressed := self._only_pressed(paths):
+            paths = [path[-1:] for path in paths]
         errors = np.zeros((7, len(self.samples)))
-        tell = partial(self._of_sample, paths=paths)
+        tell = partial(self._of_sample, paths=paths, pressed=pressed)
         for number, own, areas in self.of_regions("check of friction", tell, paths):
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
         return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
+
+    def _only_pressed(self, paths: Sequence[Sequence[_Reached]]) -> bool:
+        """Tell whether what the face shears by is that of the pressing alone."""
+        if math.hypot(*self._shear.force) > _NO_SHEAR * self.state.force:
+            return False
+        ends = zip(self.samples, paths, strict=True)
+        return all(
+            math.hypot(*reached.rate) <= _STICKS * region.coefficient
+            for region, path in ends
+            for reached in path
+        )
 
     def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
@@ -391,7 +406,7 @@ class LawShearProbe(LawErrorProbe):
         return path
 
     def _of_sample(
-        self, number: int, sample: Surface, paths: Sequence[Sequence[_Reached]]
+        self, number: int, sample: Surface, paths: Sequence[Sequence[_Reached]], pressed: bool
     ) -> Array:
         """Return how a sample ends a path, on its cells and on fewer, shape (3, 5).
 
@@ -421,6 +436,9 @@ class LawShearProbe(LawErrorProbe):
         if not self.by_shift and most >= _SLIDES * friction.coefficient:
             return found
         for row, times in enumerate((1, 2, 4)):
+            if row and pressed:  # what shears by the elements alone has no error by the cells
+                found[row] = found[0]
+                continue
             grid = sample.grid if times == 1 else coarser(sample, times)
             if row and min(sample.grid) // times < FEWEST_CELLS // 4:
                 continue

@@ -7,7 +7,7 @@ from helpers.contact_laws import PowerLaw
 
 from patchlaw.geometry import Control, Material, PatchGrid
 from patchlaw.macro import FacePair, LawContactProblem, Loads, Traction
-from patchlaw.macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
+from patchlaw.macro.contact.other_elements import carried, face_on, quadratic_dofs
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.3, 0.9))
@@ -20,6 +20,11 @@ def face_of(kind="hexahedron", order=1):
 def pair():
     above = hanging(box((0, 0, 0), (1.3, 0.9, 0.4), (3, 3, 2), "tetrahedron"), SOFT, PATCHES)
     return FacePair(face_of(), above)
+
+
+def start_from_elements(problem, known, before, body_state=0.0):
+    moved = carried(known.displacement, before, problem.face)
+    problem.start_at(moved, known.plane, body_state)
 
 
 def problem(face, errors=(0.0, 0.0)):

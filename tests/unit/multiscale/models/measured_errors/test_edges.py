@@ -11,7 +11,6 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, representative_law, run
 from patchlaw.multiscale.models.measured_errors import edges as edge_errors
 from patchlaw.multiscale.models.measured_errors.edges import edge_width
-from patchlaw.multiscale.models.measured_errors.samples import closure_under
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, Decision
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
@@ -34,7 +33,7 @@ def width_of(model, pressure=PRESSURE):
         tolerance=0.05,
         make_model=lambda _: model,
     )
-    return edge_width(model, law, float(closure_under(law, np.array(pressure))), MATERIAL)
+    return edge_width(model, law, float(law.closure_under(pressure)), MATERIAL)
 
 
 def test_width_is_a_share_of_the_distance_of_contacts_at_any_size():

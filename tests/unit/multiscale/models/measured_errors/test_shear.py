@@ -283,12 +283,23 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds,
     )
     approach, law = not by_force, [("seeds", seeds)] if seeds else []
     history = of_samples(by_force=by_force, approach=approach, law=law)
-    assert len(solved) == len(history.steps)  # other elements take products
+    nearer = approach  # by the error of the zero; other elements take products
+    assert len(solved) == len(history.steps) + nearer
     step, scatter = history.steps[-1], ["samples"] if seeds else []
     for parts in (dict(step.errors), dict(step.shear_errors)):
-        causes = ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges", "steps"]
+        causes = [
+            "mesh",
+            "quadrature",
+            "laws",
+            *scatter,
+            "grid",
+            "slopes",
+            "edges",
+            "zero",
+            "steps",
+        ]
         assert list(parts) == causes
-        assert all(0.0 < error < np.inf for error in parts.values())
+        assert all(0.0 < error < np.inf for cause, error in parts.items() if cause != "zero")
     shear, size = sum(dict(step.shear_errors).values()), response(step, by_force=by_force)
     columns = step.shear_force_error_N, step.shear_error_mm
     assert columns == pytest.approx((0.0, shear) if by_force else (shear, 0.0))
