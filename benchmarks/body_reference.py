@@ -128,10 +128,7 @@ def draw(picture, path):
 def _draw_curves(axes, curves):
     """Draw forces over the approach: the reference with its bar as points, and models as lines."""
     approach, value, bar = curves.pop("reference")
-    looks = {
-        BLOCK: (style.SKY, "--", (0.08, 0.6)),
-        "concurrent": (style.BLUE, "-", (0.52, 0.1)),
-    }
+    looks = {BLOCK: (style.SKY, "--", (0.08, 0.6)), "concurrent": (style.BLUE, "-", (0.52, 0.1))}
     for name, (colour, line, place) in looks.items():
         at, force = curves[name]
         axes.plot(1e3 * np.append(0.0, at), np.append(0.0, force), line, color=colour)

@@ -122,12 +122,7 @@ def doors(folder):
         0.1,
     )
     yield ("keys misspelt", misspellings.keys(), misspellings.key_was_offered, 0.05)
-    yield (
-        "units of the wrong case",
-        misspellings.units(),
-        misspellings.unit_was_offered,
-        0.05,
-    )
+    yield ("units of the wrong case", misspellings.units(), misspellings.unit_was_offered, 0.05)
     yield (
         "comparisons",
         compared_inputs.asked,

@@ -125,12 +125,7 @@ class Reference:
         approach, tilt = self.plane
         radius = contact_radius(self.surface, approach, tilt=tilt)
         blocks = reference_shapes(
-            self.surface,
-            approach,
-            LEG,
-            count=self.count,
-            fine=radius / self.edges,
-            tilt=tilt,
+            self.surface, approach, LEG, count=self.count, fine=radius / self.edges, tilt=tilt
         )
         return [SteppedShape(block=block, boxes=BOXES) for block in blocks]
 

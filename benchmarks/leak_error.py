@@ -185,10 +185,7 @@ def row_by_row(model, flat, separations):
             start, gap, own = (
                 state.guess,
                 state.open_gap,
-                (
-                    state.mean_pressure,
-                    state.contact_area_fraction,
-                ),
+                (state.mean_pressure, state.contact_area_fraction),
             )
         flows = gap_flows(gap, (1.0, 1.0), periodic=True)
         rows.append([*(flow.transmissivity for flow in flows), *own])

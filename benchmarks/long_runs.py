@@ -54,10 +54,7 @@ def scene(name: str, steps: int) -> Scene:
 
 def counted(what: str) -> float:
     """Return what Linux counts of this process [B]."""
-    name, key, unit = {
-        "resident": ("status", "VmRSS:", 1024),
-        "written": ("io", "wchar:", 1),
-    }[what]
+    name, key, unit = {"resident": ("status", "VmRSS:", 1024), "written": ("io", "wchar:", 1)}[what]
     text = Path(f"/proc/self/{name}").read_text(encoding="utf-8")
     return float(unit * int(text.split(key)[1].split()[0]))
 

@@ -48,9 +48,7 @@ COUPLINGS: dict[str, Changes] = {
 """Columns: the couplings, and laws of periodic samples (``law.kind = "representative"``)."""
 
 BODIES: dict[str, dict[str, Changes]] = {
-    "block": {
-        "laws of samples": {"block.lengths": [2.0, 2.0]},
-    },
+    "block": {"laws of samples": {"block.lengths": [2.0, 2.0]}},
     "body": {},
 }
 """Sections of the first body, and what single couplings need there."""
@@ -101,10 +99,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         "`load.tilt = [tx, ty]`": {"load.tilt": [1e-3, 0.0]},
         '`load.tilt = "free"`': {"load.tilt": "free"},
         "`load.approach = [up, down]`": {"load.approach": [8e-3, 2e-3]},
-        '`load.zero = "mean plane"`': {
-            "load.zero": "mean plane",
-            "load.approach": -0.01,
-        },
+        '`load.zero = "mean plane"`': {"load.zero": "mean plane", "load.approach": -0.01},
         "`accuracy`": {"accuracy": 0.4},
     },
     "Results": {

@@ -8,12 +8,8 @@ from .boundary_elements.body_modes import BodyModes as BodyModes
 from .boundary_elements.body_modes import BodyStresses as BodyStresses
 from .boundary_elements.body_modes import TractionModes as TractionModes
 from .boundary_elements.body_modes import half_space_modes as half_space_modes
-from .boundary_elements.body_modes import (
-    half_space_stress_modes as half_space_stress_modes,
-)
-from .boundary_elements.body_modes import (
-    half_space_traction_modes as half_space_traction_modes,
-)
+from .boundary_elements.body_modes import half_space_stress_modes as half_space_stress_modes
+from .boundary_elements.body_modes import half_space_traction_modes as half_space_traction_modes
 from .boundary_elements.body_modes import side_modes as side_modes
 from .boundary_elements.body_modes import side_stress_modes as side_stress_modes
 from .boundary_elements.finite_slopes import FiniteSlopes as FiniteSlopes

@@ -116,10 +116,7 @@ class Network:
             links: Which, shape (m,).
         """
         return replace(
-            self,
-            tail=self.tail[links],
-            head=self.head[links],
-            conductance=self.conductance[links],
+            self, tail=self.tail[links], head=self.head[links], conductance=self.conductance[links]
         )
 
     def within_reach(self) -> Network:

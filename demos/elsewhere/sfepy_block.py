@@ -5,14 +5,7 @@ import sys
 import numpy as np
 from law import law
 from sfepy.base.base import IndexedStruct
-from sfepy.discrete import (
-    Equation,
-    Equations,
-    FieldVariable,
-    Integral,
-    Material,
-    Problem,
-)
+from sfepy.discrete import Equation, Equations, FieldVariable, Integral, Material, Problem
 from sfepy.discrete.conditions import Conditions, EssentialBC
 from sfepy.discrete.fem import FEDomain, Field
 from sfepy.mechanics.matcoefs import stiffness_from_youngpoisson

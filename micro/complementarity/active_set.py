@@ -132,10 +132,7 @@ class ActiveSet:
         self._assess()
 
     def _assess(
-        self,
-        here: Array | None = None,
-        displaced: Displaced | None = None,
-        more: float = 0.0,
+        self, here: Array | None = None, displaced: Displaced | None = None, more: float = 0.0
     ) -> None:
         """Let free motions close the gaps, and find the residual.
 

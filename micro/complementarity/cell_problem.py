@@ -472,12 +472,7 @@ class CellProblem:
         """
         x, y = (part.start * step for part, step in zip(box, self.spacing, strict=True))
         interference = np.ascontiguousarray(self.interference[box])
-        return replace(
-            self,
-            interference=interference,
-            motions=self.motions.on(box),
-            corner=(x, y),
-        )
+        return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
 
     def among(self, cells: Indices, matrix: ComplianceMatrix | None = None) -> CellProblem:
         """Return the problem of a few of these cells, those of a surface, which carry all loads.

@@ -428,10 +428,7 @@ class _Problems:
         return math.nan if found is None else found
 
     def stiffness_errors(
-        self,
-        parts: Mapping[str, Array],
-        own_force: float,
-        behind: _Behind | None,
+        self, parts: Mapping[str, Array], own_force: float, behind: _Behind | None
     ) -> dict[str, Array]:
         """Return relative errors of stiffnesses and conductance by cause, shape (3,) each.
 

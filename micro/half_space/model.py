@@ -45,7 +45,7 @@ from patchlaw.support.arguments import (
     checked,
 )
 
-_REST, _LEAST_REST = 500.0, 3e-7
+_REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
 `FewCells`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6. A rest of 1e-8
 is rounding."""
@@ -176,11 +176,7 @@ class HalfSpaceModel:
 
     @checked
     def solve(
-        self,
-        approach: float,
-        *,
-        tilt: tuple[float, float] = (0.0, 0.0),
-        start: Start | None = None,
+        self, approach: float, *, tilt: tuple[float, float] = (0.0, 0.0), start: Start | None = None
     ) -> ContactState:
         """Solve the contact at one approach of the plane: short for `press`.
 

@@ -456,10 +456,7 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
 
 
 def resampled(
-    probe: ErrorProbe,
-    friction: FrictionModel,
-    grid: tuple[int, int],
-    tolerance: float = _TOLERANCE,
+    probe: ErrorProbe, friction: FrictionModel, grid: tuple[int, int], tolerance: float = _TOLERANCE
 ) -> tuple[HalfSpaceModel, FrictionModel]:
     """Return the normal contact and its friction on other cells, with a residual of tractions."""
     tolerance = max(tolerance, friction.tolerance)

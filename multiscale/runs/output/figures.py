@@ -35,8 +35,13 @@ _PRELOADED = [
     f"patchlaw.multiscale.results.figures.{name}"
     for name in ("drawing_server", "contact", "curves", "surface")
 ]
-_PRELOADED += ["scipy.fft", "patchlaw.multiscale.runs.output.figures"]
-_PRELOADED += ["patchlaw.multiscale.results.history"]
+_PRELOADED += [f"PIL.{kind}ImagePlugin" for kind in ("Bmp", "Gif", "Jpeg", "Png", "Ppm")]
+_PRELOADED += [
+    "matplotlib.backends.backend_agg",
+    "scipy.fft",
+    "patchlaw.multiscale.runs.output.figures",
+    "patchlaw.multiscale.results.history",
+]
 """Modules that every drawing needs, with those that they load late."""
 _ENVIRONMENT = {"PYTHONSAFEPATH": "1", "OMP_NUM_THREADS": "1"}
 """Environment of the server: without the first it imports what lies in the user's folder, without

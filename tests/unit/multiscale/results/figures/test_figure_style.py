@@ -1,7 +1,6 @@
 """All figures have one style, whoever draws them and whatever matplotlib is set to elsewhere."""
 
 import struct
-from io import BytesIO
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from matplotlib import rc_context, rcParams
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
-from matplotlib.image import imread
 
 from patchlaw.geometry import PatchGrid, Spectrum, roughness, synthesise
 from patchlaw.multiscale.results.figures import style
@@ -53,14 +51,6 @@ def test_files_have_200_dots_an_inch_and_an_svg_beside(tmp_path):
 
 def test_the_same_figure_gives_the_same_bytes():
     assert style.encoded(drawn()) == style.encoded(drawn())
-
-
-def test_png_files_show_what_matplotlib_writes():
-    figure, file = drawn(), BytesIO()
-    figure.savefig(file, format="png")
-    file.seek(0)
-    own = imread(BytesIO(style.encoded(figure)["png"]))
-    np.testing.assert_array_equal(own, imread(file)[..., :3])
 
 
 def test_no_ticks_are_made_out_of_view():
