@@ -41,6 +41,10 @@ from patchlaw.support import Array, Indices
 _FIRST, _MOST = 24, 128
 """Pressures that there is room for at first, and that are remembered at most: 80 MB on 64² coarse
 cells that are mirrored around."""
+_ROUNDING = 1e-12
+"""Part of pressures beside all directions, over them, that may be rounding. Directions of rounding
+are not at right angles to the others, and the next ones still less: with them forces erred by 6e-3,
+with pressures that met all conditions of contact."""
 
 
 class RememberedSlopes:
@@ -82,7 +86,8 @@ class RememberedSlopes:
 
         Args:
             pressure: Pressures on the few cells, shape (n,) [MPa].
-            rest: Part of the pressures that need not be known, by its norm over theirs.
+            rest: Part of the pressures that need not be known, by its norm over theirs; 1e-12 at
+                least.
 
         Returns:
             Whether they were not known.
@@ -91,6 +96,8 @@ class RememberedSlopes:
         size, parts = float(np.linalg.norm(loaded)), self._along(0, pressure)
         if size**2 - float(parts @ parts) <= (rest * size) ** 2:
             return False
+        if float(np.linalg.norm(self._beyond(loaded))) <= max(rest, _ROUNDING) * size:
+            return False  # the difference of squares was rounding
         if self._known == _MOST:
             self._forget()
         self._remember(pressure, loaded)
@@ -180,6 +187,13 @@ class RememberedSlopes:
         everywhere.ravel()[self._cells] = pressure
         return self._slopes.coarsened(everywhere).ravel()
 
+    def _beyond(self, loaded: Array) -> Array:
+        """Return what pressures on the coarse cells, flat, have beside all directions."""
+        directions = self._coarse[0, : self._known]
+        for _ in range(2):  # orthogonal to rounding
+            loaded = loaded - (directions @ loaded) @ directions
+        return loaded
+
     def _along(self, what: int, pressure: Array) -> Array:
         """Return products of pressures with directions or displacements by them, shape (m,)."""
         return np.asarray(self._few[what, : self._known] @ pressure / self._per_coarse)
@@ -195,9 +209,7 @@ class RememberedSlopes:
         self.learnt.append(pressure.copy())
         if last == self._few.shape[1]:
             self._coarse, self._few = _lengthened(self._coarse), _lengthened(self._few)
-        directions = self._coarse[0]
-        for _ in range(2):  # orthogonal to rounding
-            loaded = loaded - (directions[:last] @ loaded) @ directions[:last]
+        directions, loaded = self._coarse[0], self._beyond(loaded)
         directions[last] = loaded / np.linalg.norm(loaded)
         moved, fields, works = slopes.orders(directions[last].reshape(slopes.grid))
         self._coarse[1:, last] = moved.reshape(2, -1)

@@ -47,8 +47,7 @@ from patchlaw.support.arguments import (
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
-`FewCells`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6. A rest of 1e-8
-is rounding."""
+`FewCells`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6."""
 _ROUNDING = 1e-14
 """Pressures over the largest one that are rounding. A plane that is free to turn about the line of
 two cells under it may or may not rest on a third one, with nothing: no area of contact."""

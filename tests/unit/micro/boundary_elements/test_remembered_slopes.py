@@ -62,6 +62,17 @@ def test_new_pressures_and_their_combinations_are_exact(slopes):
         assert on_cells == pytest.approx(exact.ravel()[cells], abs=slack)
 
 
+def test_what_is_known_to_rounding_is_not_worked_out_again(slopes):
+    """Directions of rounding are not at right angles: sums of them double what others tell."""
+    cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
+    drawn = np.random.default_rng(2).random((3, len(cells)))
+    remembering = RememberedSlopes(slopes, cells)
+    for few in drawn:
+        assert remembering.learn(few, 0.0)
+    for shares in np.random.default_rng(3).random((20, len(drawn))):
+        assert not remembering.learn(shares @ drawn, 0.0)
+
+
 def test_the_interface_stiffness_is_that_of_the_slopes_worked_out_anew(slopes):
     quick = model_with(slopes).quick_up_to(LARGEST)
     state = quick.press(LARGEST)
