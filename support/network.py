@@ -135,7 +135,7 @@ class Network:
         """Largest conductance beside each node that double precision resolves, shape (n + 2,).
 
         It is `_WIDEST_STEP` times what the widest path to a terminal lets through, or infinite
-        where that exceeds the conductances there. All links must be joined to a terminal.
+        where that exceeds the conductances there, and where no path leads to a terminal.
         """
         # with wide links alone most nodes reach a terminal, and stand for it here
         wide = self.only(_WIDEST_STEP * self.conductance >= self.conductance.max())
