@@ -1,4 +1,4 @@
-"""Maps of cells as networks: links between cells and terminals, and pools that paths join.
+"""Maps of cells as networks: links between cells and terminals, and pools connected over sides.
 
 Theory: docs/theory.md, section 16.
 """
@@ -22,10 +22,10 @@ def turned(
 
 
 def link_ends(values: NDArray[Any]) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-    """Return what cells at the tails and heads of links along x and along y have.
+    """Return the values at the tails and heads of all links along x, and of those along y.
 
     Args:
-        values: That of cells and terminals, shape (nx + 2, ny).
+        values: Values of the cells, between lines of those of the terminals, shape (nx + 2, ny).
     """
     inner = values[1:-1]
     return [(values[:-1], values[1:]), (inner, np.roll(inner, -1, axis=1))]
@@ -96,7 +96,9 @@ def cell_network(
 
 
 def joined_pools(pools: Numbers, count: int, axis: int) -> Numbers:
-    """Return a number for each pool that those share which paths over sides join, 0 for contact.
+    """Return the number of the connected pools that each pool is one of, 0 for contact.
+
+    Pools are connected where paths over the sides of the map join them.
 
     Args:
         pools: Number of the pool that a cell belongs to, 0 for contact, shape (nx, ny).

@@ -291,7 +291,7 @@ class _Turned:
         return [np.nan_to_num(link * (tail - head), copy=False) for link, (tail, head) in ends]
 
     def pools(self, some: Flags) -> Numbers:
-        """Return a number for each of some cells that those share which paths join, 0 of others."""
+        """Return the number of the pool that each of some cells is in, 0 of others, (nx, ny)."""
         from scipy import ndimage
 
         pools, count = ndimage.label(some)

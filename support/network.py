@@ -33,7 +33,7 @@ _GOAL = 0.1 * MOST_IMBALANCE
 the flow errs by as much of itself at most."""
 _MOST_ITERATIONS = 500
 _FEW = 10_000
-"""Links of which a spanning tree is made, rather than half of them looked at."""
+"""Largest number of links whose spanning tree is made without halving them before."""
 _GROWTH = 2.0
 """Growth of the imbalance over its least at which the iteration begins anew from where it is."""
 
@@ -101,7 +101,7 @@ class Network:
 
     @cached_property
     def joined(self) -> NDArray[np.integer]:
-        """A number for each node that those share which links join, shape (n + 2,)."""
+        """Number of the connected component that each node is in, shape (n + 2,)."""
         return joined(self.tail, self.head, self.count + 2)
 
     @property
@@ -135,7 +135,7 @@ class Network:
         """Largest conductance beside each node that double precision resolves, shape (n + 2,).
 
         It is `_WIDEST_STEP` times what the widest path to a terminal lets through, or infinite
-        where that exceeds the conductances there. All links must be joined to a terminal.
+        where that exceeds the conductances there, and where no path leads to a terminal.
         """
         # with wide links alone most nodes reach a terminal, and stand for it here
         wide = self.only(_WIDEST_STEP * self.conductance >= self.conductance.max())
@@ -184,7 +184,7 @@ class NetworkFlow:
 
 
 def joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
-    """Return a number for each of some nodes that those share which links join, shape (count,).
+    """Return the number of the connected component that each node is in, shape (count,).
 
     Args:
         tail: Node where each of m links begins, shape (m,).
@@ -199,9 +199,9 @@ def joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
 def narrowest_link(tail: Numbers, head: Numbers, conductance: Array, ends: tuple[int, int]) -> int:
     """Return the number of the narrowest link on the widest path between two nodes.
 
-    Its conductance is the largest that the narrowest link of a path has. While there are many
-    links, and the wider half of them joins both nodes, the others are left out; otherwise nodes
-    that it joins count as one. The last ones' maximum spanning tree tells it.
+    Its conductance is the largest that the narrowest link of a path has. Many links are halved:
+    where the wider half joins both nodes, the others are left out; where not, the nodes that it
+    joins are merged. The path lies in the maximum spanning tree of the links that are left.
 
     Args:
         tail: Node where each of m links begins, shape (m,).

@@ -249,17 +249,9 @@ class TriangleFace:
 
     def _limits(self, largest: Array, is_open: Flags) -> Array:
         """Return the transmissivities of open triangles that are resolved, shape (m,) [mm³]."""
-        ends = np.sort(np.stack(self._links(is_open), axis=-1).reshape(-1, 2), axis=1)
-        values = np.repeat(largest[is_open], 3)
-        order = np.lexsort((-values, ends[:, 1], ends[:, 0]))
-        ends, values = ends[order], values[order]
-        first = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # the largest of a side
-        first &= ends[:, 0] != ends[:, 1]
-        network = Network(self._count, ends[first, 0], ends[first, 1], values[first])
-        reached = network.joined[network.tail] == network.joined[network.inlet]
-        limits = np.full(self._count + 2, np.inf)
-        joined = network.joined == network.joined[network.inlet]
-        limits[joined] = network.only(reached).limits[joined]
+        tail, head = self._links(is_open)
+        apart, values = tail != head, np.repeat(largest[is_open, None], 3, axis=1)
+        limits = Network(self._count, tail[apart], head[apart], values[apart]).limits
         return np.asarray(limits[self._node[is_open]].min(axis=1))
 
 

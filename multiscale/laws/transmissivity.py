@@ -103,14 +103,14 @@ _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
 _OFF, _MOST, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 0.75, 8e-3, 8
-"""Rows are added on both sides of one whose T those beside it miss by more than the third part of
-the error of the grid, but no less than the first and no more than the second part of T, until they
-are as near as this part of the separation at first touch, in so many passes at most. Ten samples,
-isotropic and turned, down to a fifth of that separation or to closing, had 7 to 26 rows, whose T
-between them erred by 0.1 % in the median, 1 % in 95 % of 354 flows and 11 % next to closing. Every
-second row left out told as much in 99 % of them, and together with the error of the grid in all
-(`benchmarks/leak_rows.py`). With half of T as the most, errors between rows were wrong by a factor
-of ten next to closing."""
+"""Rows are added on both sides of one whose T the others miss by more than `_OF_GRID` times the
+error of the grid, which counts as `_OFF` times T at least and `_MOST` times T at most, until rows
+are as near as `_FINEST` times the separation at first touch, in `_PASSES` passes at most. Ten
+samples, isotropic and turned, down to a fifth of that separation or to closing, had 7 to 26 rows,
+whose T between them erred by 0.1 % in the median, 1 % in 95 % of 354 flows and 11 % next to
+closing. Every second row left out told as much in 99 % of them, and together with the error of the
+grid in all (`benchmarks/leak_rows.py`). With half of T as the most, errors between rows were wrong
+by a factor of ten next to closing."""
 _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
