@@ -95,9 +95,7 @@ def side_stresses(poisson_ratio: float, x: Array, wave_numbers: Array) -> Array:
         σ_xx, σ_yy (~ cos ky) and σ_xy (~ sin ky) by loads of 1 N/mm, shape (3, w, n, n), the loads
         last [1/mm].
     """
-    values = _values(_stress_splines(poisson_ratio), x, wave_numbers)
-    values /= np.add.outer(x, x)
-    return values
+    return _values(_stress_splines(poisson_ratio), x, wave_numbers) / np.add.outer(x, x)
 
 
 @cache
@@ -324,8 +322,7 @@ class FreeSides:
         Returns:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
-        nu = self.poisson_ratio
-        numbers = self._wave_numbers(axis, waves, 2.0 * self.decay_length)
+        nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, 2.0 * self.decay_length)
         parts = side_stresses(nu, distances, numbers)
         full = np.pi * waves / self.lengths[1 - axis]
         for share, number in ((0.5 - nu, numbers), (nu - 0.5, full)):

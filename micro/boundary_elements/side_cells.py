@@ -84,8 +84,7 @@ class _SidePair:
             return np.concatenate(parts, axis=1) if stress else parts
 
         few = np.array_split(np.arange(cells + 1), 1 + cells // 16)  # which stay in the cache
-        kernels = np.concatenate([summed(some) for some in few])
-        return cls(means, kernels, np.arange(cells))
+        return cls(means, np.concatenate([summed(some) for some in few]), np.arange(cells))
 
     def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
         """Return the sides across y of a square from those across x: waves do the same there."""
