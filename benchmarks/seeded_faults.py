@@ -127,8 +127,8 @@ FAULTS = [
     # free sides, finite bodies, finite slopes
     Fault(
         "micro",
-        "rest = (0.5 - nu) * (cut_off - full)",
-        "rest = (0.5 + nu) * (cut_off - full)",
+        "((0.5 - nu, numbers), (nu - 0.5, full))",
+        "((0.5 + nu, numbers), (-nu - 0.5, full))",
         "unit/micro/boundary_elements/test_side_stresses.py unit/micro/boundary_elements",
     ),
     Fault(

@@ -232,7 +232,8 @@ def prepared_map(
         heights=work.heights, lengths=work.lengths, periodic=work.periodic, source=source
     )
     check_slopes(surface, advice)
-    return replace(surface, notes=(*found, *surface_notes(surface)))
+    vars(surface)["notes"] = (*found, *surface_notes(surface))  # what is known of it is kept
+    return surface
 
 
 def _without_gaps(

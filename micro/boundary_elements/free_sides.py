@@ -61,7 +61,7 @@ Spline = tuple[Any, ...]
 objects of splines check every call for longer than they evaluate some 30 × 30 places."""
 
 
-def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array:
+def side_compliance(poisson_ratio: float, x: Array, wave_numbers: Array) -> Array:
     """Return normal displacements at distances x from the edge by line loads at distances x.
 
     Only what the side adds to the half-space is returned, for E* = 1.
@@ -69,19 +69,19 @@ def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array
     Args:
         poisson_ratio: ν.
         x: Distances, ascending, shape (n,) [mm].
-        wave_number: k of loads ~ cos ky along the edge [1/mm].
+        wave_numbers: k > 0 of loads ~ cos ky along the edge, shape (w,) [1/mm].
 
     Returns:
-        Shape (n, n); symmetric.
+        Shape (w, n, n); symmetric.
 
     Source:
         Hetényi 1970, J. Appl. Mech. 37, 75-80; Keer, Lee & Mura 1983, Int. J. Solids Struct.
         19, 497-508.
     """
-    return _values(_compliance_splines(poisson_ratio), x * wave_number)[0]
+    return _values(_compliance_splines(poisson_ratio), x, wave_numbers)[0]
 
 
-def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
+def side_stresses(poisson_ratio: float, x: Array, wave_numbers: Array) -> Array:
     """Return stresses at distances x from the edge by line loads at distances x.
 
     Only what the side adds to those of the half-space is returned.
@@ -89,13 +89,13 @@ def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
     Args:
         poisson_ratio: ν.
         x: Distances, ascending, shape (n,) [mm].
-        wave_number: k > 0 of loads ~ cos ky along the edge [1/mm].
+        wave_numbers: k > 0 of loads ~ cos ky along the edge, shape (w,) [1/mm].
 
     Returns:
-        σ_xx, σ_yy (~ cos ky) and σ_xy (~ sin ky) by loads of 1 N/mm, shape (3, n, n), the loads
+        σ_xx, σ_yy (~ cos ky) and σ_xy (~ sin ky) by loads of 1 N/mm, shape (3, w, n, n), the loads
         last [1/mm].
     """
-    return _values(_stress_splines(poisson_ratio), x * wave_number) / np.add.outer(x, x)
+    return _values(_stress_splines(poisson_ratio), x, wave_numbers) / np.add.outer(x, x)
 
 
 @cache
@@ -118,16 +118,19 @@ def _spline(logs: Array, values: Array) -> Spline:
     return (*spline.get_knots(), spline.get_coeffs(), 3, 3)
 
 
-def _values(splines: list[Spline], distances: Array) -> Array:
-    """Return functions at pairs of ascending distances, (functions, n, n); 0 beyond tables."""
+def _values(splines: list[Spline], x: Array, wave_numbers: Array) -> Array:
+    """Return functions at pairs of x times w wave numbers, (functions, w, n, n); 0 beyond tables.
+
+    The x ascend.
+    """
     first, *_, last = splines[0][0]
-    logs = np.log(distances)
-    within = int(np.searchsorted(logs, last))
-    places = np.maximum(logs[:within], first)
-    values = np.zeros((len(splines), len(logs), len(logs)))
-    for value, spline in zip(values, splines, strict=True):
-        if within:
-            value[:within, :within] = scipy.interpolate.bisplev(places, places, spline)
+    logs = np.add.outer(np.log(wave_numbers), np.log(x))
+    values = np.zeros((len(splines), *logs.shape, len(x)))
+    for wave, (places, within) in enumerate(zip(logs, (logs < last).sum(axis=1), strict=True)):
+        places = np.maximum(places[:within], first)
+        for value, spline in zip(values, splines, strict=True):
+            if within:
+                value[wave, :within, :within] = scipy.interpolate.bisplev(places, places, spline)
     return values
 
 
@@ -300,8 +303,7 @@ class FreeSides:
             Shape (w, n, n); symmetric.
         """
         nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, self.decay_length)
-        parts = np.stack([side_compliance(nu, distances, number) for number in numbers])
-        return self.share * parts
+        return self.share * side_compliance(nu, distances, numbers)
 
     def stresses(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.
@@ -320,17 +322,14 @@ class FreeSides:
         Returns:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
-        nu = self.poisson_ratio
-        numbers = self._wave_numbers(axis, waves, 2.0 * self.decay_length)
-        parts = np.stack([side_stresses(nu, distances, number) for number in numbers], axis=1)
-        apart = np.add.outer(distances, distances)
-        cut_off, full = (
-            number[:, None, None] * np.exp(-np.multiply.outer(number, apart))
-            for number in (numbers, np.pi * waves / self.lengths[1 - axis])
-        )
-        rest = (0.5 - nu) * (cut_off - full)
-        parts[0] += rest
-        parts[2] -= rest
+        nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, 2.0 * self.decay_length)
+        parts = side_stresses(nu, distances, numbers)
+        full = np.pi * waves / self.lengths[1 - axis]
+        for share, number in ((0.5 - nu, numbers), (nu - 0.5, full)):
+            falling = np.exp(-np.multiply.outer(number, distances))[:, :, None]
+            rest = share * number[:, None, None] * falling * falling.transpose(0, 2, 1)
+            parts[0] += rest
+            parts[2] -= rest
         return parts
 
     def patch_compliance(self, patches: PatchGrid) -> Array:

@@ -69,18 +69,22 @@ class _SidePair:
         step, period = length / rows, 2 * cells
         nodes = _nodes(length, rows, stress=stress)
         means, combined = _means(sides, axis, rows, nodes)
-        # waves on twice the length of a side that cells take for the same, some running backwards
-        waves = np.add.outer((-period, 0, period), np.arange(cells + 1))
-        kernels: Array = np.zeros(())
-        for some in waves:
-            of_nodes = (sides.stresses if stress else sides.compliance)(axis, nodes, np.abs(some))
-            if stress:
-                of_nodes[2] *= np.sign(some)[:, None, None]
-            kernels = kernels + (step * np.sinc(some / period) ** 2)[:, None, None] * of_nodes
-        kernels = combined @ kernels @ combined.T
-        if stress:
-            kernels = np.concatenate(kernels, axis=1)
-        return cls(means, kernels, np.arange(cells))
+        of_waves = sides.stresses if stress else sides.compliance
+
+        def summed(waves: Indices) -> Array:
+            # waves on twice the length of a side that cells take for the same, some run backwards
+            total: Any = 0.0
+            for alias in (waves - period, waves, waves + period):
+                of_nodes = of_waves(axis, nodes, np.abs(alias))
+                of_nodes *= (step * np.sinc(alias / period) ** 2)[:, None, None]
+                if stress:
+                    of_nodes[2] *= np.sign(alias)[:, None, None]
+                total = total + of_nodes
+            parts = combined @ total @ combined.T
+            return np.concatenate(parts, axis=1) if stress else parts
+
+        few = np.array_split(np.arange(cells + 1), 1 + cells // 16)  # which stay in the cache
+        return cls(means, np.concatenate([summed(some) for some in few]), np.arange(cells))
 
     def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
         """Return the sides across y of a square from those across x: waves do the same there."""

@@ -15,7 +15,7 @@ RATIOS = [-0.5, 0.0, 0.15, 0.45]
 def test_the_side_is_free(nu):
     """At the side, the half-space's stresses by a line load are taken off."""
     places = np.array([0.1, 0.4, 1.0, 3.0])
-    found = side_stresses(nu, np.concatenate([[1e-6], places]), 1.0)[:, 0, 1:]
+    found = side_stresses(nu, np.concatenate([[1e-6], places]), np.ones(1))[:, 0, 0, 1:]
     half_space = (0.5 - nu) * np.exp(-places)
     # 2e-4 and 2e-5: from the end of the table at 1e-11, and the distance 1e-6
     assert found[0] == pytest.approx(-half_space, abs=4e-4)
@@ -27,7 +27,7 @@ def test_a_line_load_at_the_edge_presses_a_wedge(nu):
     # Force P along one face of a wedge of 90°: at the distance r on the other face the radial
     # stress P/2r (1/(π/4 − ½) − 1/(π/4 + ½)) (Johnson 1985, eq. 2.32), in plane strain.
     expected = 0.5 / (np.pi / 4 - 0.5) - 0.5 / (np.pi / 4 + 0.5)
-    found = side_stresses(nu, np.array([1e-4, 1.0]), 1e-4)[:, 1, 0]
+    found = side_stresses(nu, np.array([1e-4, 1.0]), np.array([1e-4]))[:, 0, 1, 0]
     # 2e-4: from the place of the load, and waves that are not yet long
     assert found[0] == pytest.approx(expected, rel=1e-3)
     assert found[1] == pytest.approx(nu * expected, abs=1e-3)
@@ -36,12 +36,12 @@ def test_a_line_load_at_the_edge_presses_a_wedge(nu):
 
 def test_only_distances_in_waves_matter():
     x = np.array([0.02, 0.1, 0.7])
-    shorter = 3.0 * side_stresses(0.3, 3.0 * x, 1.0)
-    np.testing.assert_allclose(side_stresses(0.3, x, 3.0), shorter, rtol=1e-12)
+    shorter = 3.0 * side_stresses(0.3, 3.0 * x, np.ones(1))
+    np.testing.assert_allclose(side_stresses(0.3, x, np.array([3.0])), shorter, rtol=1e-12)
 
 
 def test_a_far_side_adds_nothing():
-    assert not side_stresses(0.3, np.array([50.0, 60.0]), 1.0).any()
+    assert not side_stresses(0.3, np.array([50.0, 60.0]), np.ones(1)).any()
 
 
 @pytest.mark.parametrize("nu", RATIOS)
