@@ -228,14 +228,20 @@ class GridCompliance:
             return partial(Extension(cells, inverse.grid).inverse, inverse)
         return partial(inverse.on_cells, cells)
 
-    def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
+    def matrix(self, flat: Indices, columns: int, *, of: Cells | None = None) -> ComplianceMatrix:
         """Return the compliance of some cells alone as a matrix.
 
         Args:
             flat: Their flat indices, shape (n,).
             columns: Number of columns of the grid.
+            of: See `ComplianceMatrix`.
         """
-        return ComplianceMatrix(self._between(*np.divmod(flat, columns)))
+        row, column = np.divmod(flat, columns)
+        total = np.zeros((len(flat), len(flat)))
+        self._half_space.add_between(total, row, column)
+        for term in self._terms:
+            term.add_between(total, row, column)
+        return ComplianceMatrix(total, of=of)
 
     def solved_on(self, cells: Cells) -> GridCompliance | ComplianceMatrix:
         """Return what linear problems of some cells are solved by: their matrix if they are few.
@@ -243,18 +249,10 @@ class GridCompliance:
         Args:
             cells: The cells.
         """
-        size = math.prod(self._half_space.compliance.grid)
+        size = math.prod(grid := self._half_space.compliance.grid)
         if size > _SMALL or len(cells.flat) ** 2 > _FEW * size:
             return self
-        return ComplianceMatrix(self._between(cells.rows[cells.row], cells.column), of=cells)
-
-    def _between(self, row: Indices, column: Indices) -> Array:
-        """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
-        total = np.zeros((len(row), len(row)))
-        self._half_space.add_between(total, row, column)
-        for term in self._terms:
-            term.add_between(total, row, column)
-        return total
+        return self.matrix(cells.flat, grid[1], of=cells)
 
     def on_patches(self, flat: Indices, along: tuple[Array, Array]) -> Array:
         """Return the mean displacements of patches by unit pressures on n cells, (N, n) [mm/MPa].
