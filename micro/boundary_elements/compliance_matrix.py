@@ -241,6 +241,14 @@ finite slopes add, is what the derivative of the force errs by: 2e-8 at most on 
 surfaces, with 2e-4 as well."""
 
 
+def _factors(matrix: Array) -> tuple[Array, bool]:
+    """Return Cholesky's factors of a matrix, or those of its diagonal, with which CG iterates."""
+    try:
+        return scipy.linalg.cho_factor(matrix, lower=True, check_finite=False)
+    except np.linalg.LinAlgError:  # to rounding, or terms that err
+        return scipy.linalg.cho_factor(np.diag(np.diag(matrix)), lower=True)
+
+
 class ComplianceMatrix:
     """Compliance of n cells, a column of them, by its matrix; see `GridCompliance`.
 
@@ -248,14 +256,17 @@ class ComplianceMatrix:
         matrix: Displacements of the cells by unit pressures on them, shape (n, n) [mm/MPa].
         added: Columns a and b of a symmetric matrix a bᵀ + b aᵀ that is added to it, shape (n, m)
             both; None: none.
+        of: The cells on a larger grid, where linear problems of just these are solved; None: none.
 
     Attributes:
         products: Products with pressures so far.
     """
 
-    def __init__(self, matrix: Array, added: tuple[Array, Array] | None = None) -> None:
+    def __init__(
+        self, matrix: Array, added: tuple[Array, Array] | None = None, *, of: Cells | None = None
+    ) -> None:
         self._matrix, self._added = matrix, added
-        self._last: tuple[Cells, Array, tuple[Array, bool]] | None = None
+        self._last = None if of is None else (of, matrix, _factors(matrix))
         self.products = 0
 
     @property
@@ -281,6 +292,10 @@ class ComplianceMatrix:
         if self._added is not None:
             moved += self.displacement_by_added(pressure)
         return moved
+
+    def solved_on(self, cells: Cells) -> ComplianceMatrix:
+        """Return what linear problems of some cells are solved by; see `GridCompliance`."""
+        return self
 
     def displaced_by(self, cells: Cells, pressure: Array) -> Displaced:
         """Return the displacements of all cells by pressures on some; see `GridCompliance`."""
@@ -323,11 +338,7 @@ class ComplianceMatrix:
         """Return the matrix of some cells, and its factors."""
         if self._last is None or self._last[0] is not cells:
             part = self.of(cells.flat)
-            try:
-                factors = scipy.linalg.cho_factor(part, lower=True, check_finite=False)
-            except np.linalg.LinAlgError:  # to rounding, or terms that err: CG then iterates
-                factors = scipy.linalg.cho_factor(np.diag(np.diag(part)), lower=True)
-            self._last = cells, part, factors
+            self._last = cells, part, _factors(part)
         return self._last[1:]
 
 

@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
@@ -45,6 +46,9 @@ _half_space = cached_where_small(
 )(HalfSpaceGrid)
 _CACHES = "half_space", "_terms_on", "_matrices"
 """What is cached of a body without its finite slopes."""
+_FEW, _SMALL = 1.5, 160**2
+"""Square of the number of cells that are solved on by their own matrix while others yield, over all
+cells of a grid, and cells of such a grid, at most: up to there lines of free sides are kept."""
 _MOST_BYTES = 1e8
 """Size of the matrices of few cells that are cached [B]."""
 
@@ -224,19 +228,31 @@ class GridCompliance:
             return partial(Extension(cells, inverse.grid).inverse, inverse)
         return partial(inverse.on_cells, cells)
 
-    def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
+    def matrix(self, flat: Indices, columns: int, *, of: Cells | None = None) -> ComplianceMatrix:
         """Return the compliance of some cells alone as a matrix.
 
         Args:
             flat: Their flat indices, shape (n,).
             columns: Number of columns of the grid.
+            of: See `ComplianceMatrix`.
         """
         row, column = np.divmod(flat, columns)
         total = np.zeros((len(flat), len(flat)))
         self._half_space.add_between(total, row, column)
         for term in self._terms:
             term.add_between(total, row, column)
-        return ComplianceMatrix(total)
+        return ComplianceMatrix(total, of=of)
+
+    def solved_on(self, cells: Cells) -> GridCompliance | ComplianceMatrix:
+        """Return what linear problems of some cells are solved by: their matrix if they are few.
+
+        Args:
+            cells: The cells.
+        """
+        size = math.prod(grid := self._half_space.compliance.grid)
+        if size > _SMALL or len(cells.flat) ** 2 > _FEW * size:
+            return self
+        return self.matrix(cells.flat, grid[1], of=cells)
 
     def on_patches(self, flat: Indices, along: tuple[Array, Array]) -> Array:
         """Return the mean displacements of patches by unit pressures on n cells, (N, n) [mm/MPa].

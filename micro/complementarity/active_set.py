@@ -487,7 +487,9 @@ class ActiveSet:
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
         cells, modes = Cells.of(flat, self.gap.shape), self.problem.motions.modes_of(flat)
-        return ContactCells(self.problem.grid, cells, modes)
+        grid = self.problem.grid
+        # few cells of many in contact may bear less than the hardness
+        return ContactCells(grid.solved_on(cells) if self.problem.yields else grid, cells, modes)
 
 
 def solve(problem: CellProblem, start: Array, *, most_steps: int = 200) -> ContactPressures:

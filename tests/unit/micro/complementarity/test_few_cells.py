@@ -10,7 +10,7 @@ from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
 from patchlaw.micro.boundary_elements import side_cells
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
 from patchlaw.micro.complementarity import solver
@@ -130,6 +130,25 @@ def test_matrix_that_errs_is_still_solved():
     cells = Cells.of(np.arange(6), (6, 1))
     found = ComplianceMatrix(singular).inverse_on(cells)(np.ones(6))
     assert found == pytest.approx(1.0 / np.diag(singular), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_cells_that_do_not_yield_are_solved_on_by_their_matrix(seed, monkeypatch):
+    """They are few of those in contact; against iterations with transforms."""
+    contact, load = model(seed, hardness=10.0), Control(force=5.0 * np.prod(LENGTHS))
+    used, solved_on = [], GridCompliance.solved_on
+
+    def recorded(grid, cells):
+        used.append(solved_on(grid, cells))
+        return used[-1]
+
+    monkeypatch.setattr(GridCompliance, "solved_on", recorded)
+    one = contact.press(load)
+    assert any(isinstance(each, ComplianceMatrix) for each in used)
+    monkeypatch.setattr(GridCompliance, "solved_on", lambda grid, cells: grid)
+    other = contact.press(load)
+    assert one.approach == pytest.approx(other.approach, rel=1e-10)
+    np.testing.assert_allclose(one.pressures, other.pressures, atol=1e-8 * 10.0)
 
 
 def test_many_cells_take_transforms(few):
