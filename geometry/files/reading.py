@@ -311,7 +311,7 @@ def _laid_out(
     sides = lengths if lengths is not None else content.lengths
     if sides is None:
         raise InputError(
-            "the file has no lengths, they must be given",
+            "the file states no sides in a unit of length, they must be given",
             allowed="lengths, the sides (Lx, Ly) of the whole map",
         )
     if lengths is None and max(sides) > LARGEST_MAP:

@@ -202,7 +202,7 @@ def _readable(scene: Scene) -> tuple[Scene, list[str]]:
 def _in_words(error: InputError) -> InputError:
     """Return an error on keys of a scene with the words of this command that set them."""
     problem = _as_words(error.problem)
-    if "no lengths" not in problem:
+    if "no sides in a unit" not in problem:
         return InputError(problem, allowed=error.allowed, key=error.key, file=error.file)
     allowed = "--lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit UNIT, if not mm"
     return InputError(problem, allowed=allowed, file=error.file)

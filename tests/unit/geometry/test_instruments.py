@@ -256,12 +256,20 @@ def test_lengths_are_passed_on_to_formats_without(tmp_path):
 
     library()
     savemat(tmp_path / "scan.mat", {"heights": 1e-3 * files.NUMBERS})
-    with pytest.raises(InputError, match="the file has no lengths, they must be given"):
+    with pytest.raises(InputError, match="no sides in a unit of length, they must be given"):
         read_surface(tmp_path / "scan.mat")
     surface = read_surface(tmp_path / "scan.mat", lengths=(0.7, 0.5), height_unit="um")
     assert surface.lengths == (0.7, 0.5)
     assert np.ptp(surface.heights) == pytest.approx(1e-6 * np.ptp(files.NUMBERS))
     assert surface.source.endswith("heights taken in µm")
+
+
+def test_sides_without_a_unit_are_none(tmp_path):
+    made = library().Topography(1e-4 * files.NUMBERS, (0.7, 0.5))
+    made.to_netcdf(str(tmp_path / "scan.nc"))
+    with pytest.raises(InputError, match="no sides in a unit of length, they must be given"):
+        read_surface(tmp_path / "scan.nc")
+    assert read_surface(tmp_path / "scan.nc", lengths=(0.7, 0.5)).lengths == (0.7, 0.5)
 
 
 @pytest.mark.parametrize("title", ["", "H", "Hö", "Höh"])  # one to four zeros after the header
@@ -283,7 +291,7 @@ def test_simple_fields_state_units_or_are_asked_for_them(tmp_path):
     assert surface.lengths == pytest.approx(lengths, rel=1e-13)
     for left_out in ("XReal", "XYUnits"):
         path.write_bytes(files.gsf(**{left_out: None}))
-        with pytest.raises(InputError, match="the file has no lengths, they must be given"):
+        with pytest.raises(InputError, match="no sides in a unit of length, they must be given"):
             read_surface(path)
         assert read_surface(path, lengths=(0.2, 0.3), missing="fill").lengths == (0.2, 0.3)
 
