@@ -164,10 +164,10 @@ class Run:
         scene: Scene,
         comm: Comm | None = None,
         stated: Scene | None = None,
-        observe: ProgressObserver = unobserved,
+        observe: ProgressObserver | None = None,
     ) -> None:
         self.clock = Clock()
-        self.clock.observe = observe
+        self.clock.observe = observe or unobserved
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = Position()
@@ -347,9 +347,7 @@ def run(
     Note:
         Collective.
     """
-    with (
-        run_progress(comm, scene.loading) if progress else nullcontext((None, unobserved)) as shown
-    ):
+    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
         advance, at = shown
         whole = Run(scene, comm, observe=at)
         try:

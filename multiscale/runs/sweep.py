@@ -34,6 +34,7 @@ from patchlaw.support.readable import (
     data_frame,
     of_columns,
     spread,
+    unobserved,
 )
 
 MOST_CASES = 100_000
@@ -193,7 +194,7 @@ def sweep(
     *,
     folder: str | Path | None = None,
     part: tuple[int, int] = (1, 1),
-    observe: Callable[[Case, CaseResult], object] = lambda case, result: None,
+    observe: Callable[[Case, CaseResult], object] | None = None,
     progress: bool = False,
 ) -> SweepResults:
     """Run a scene for all combinations of values of its keys.
@@ -240,7 +241,7 @@ def sweep(
     with shown as tell:
         results = run_cases(
             cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
-            part=part, observe=tell,
+            part=part, observe=tell or unobserved,
         )  # fmt: skip
     return SweepResults(cases, results)
 
