@@ -209,13 +209,10 @@ class ConductanceObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        for full, why in (
-            (True, "without bound, as the surfaces touch everywhere"),
-            (
-                False,
-                "not found: the mean gap hardly closes, or the linear solution did not converge",
-            ),
-        ):
+        for full, why in {
+            True: "without bound, as the surfaces touch everywhere",
+            False: "not found: the mean gap hardly closes, or a linear solution did not converge",
+        }.items():
             numbers = [number for number, touches in self._unknown.items() if touches is full]
             if numbers:
                 yield (

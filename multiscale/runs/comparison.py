@@ -286,7 +286,7 @@ def compare(
         (begun or unobserved)(one)
         return solved(one, progress)
 
-    results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe or unobserved)
+    results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe)
     rows = [Row(name=one.name, scene=one.scene, result=results[n]) for n, one in enumerate(ways)]
     return compared(scene, rows, against)
 

@@ -34,7 +34,6 @@ from patchlaw.support.readable import (
     data_frame,
     of_columns,
     spread,
-    unobserved,
 )
 
 MOST_CASES = 100_000
@@ -241,7 +240,7 @@ def sweep(
     with shown as tell:
         results = run_cases(
             cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
-            part=part, observe=tell or unobserved,
+            part=part, observe=tell,
         )  # fmt: skip
     return SweepResults(cases, results)
 

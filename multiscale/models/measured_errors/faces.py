@@ -365,14 +365,13 @@ class LawErrorProbe(SampleProbe):
         """
         force, control = self.state.force, self.control
         sizes = self.response.stiffness * np.abs(self.answer[:4])
-        state = kind, control.body_state, control.tilt, control.moment
-        for at, errors, *loaded in self.in_proportion:
-            same = tuple(loaded) == state and not self.worn
-            if same and max(at / force, force / at) <= _SAME_FORCE:
+        here = kind, control.body_state, control.tilt, control.moment
+        for at, errors, *own in self.in_proportion:
+            if tuple(own) == here and not self.worn and max(at / force, force / at) <= _SAME_FORCE:
                 return np.append(errors * sizes, np.zeros(len(self.answer) - 4))
         errors = measure()
         shares = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
-        self.in_proportion.append((force, shares, *state))
+        self.in_proportion.append((force, shares, *here))
         return errors
 
     @cached_property
