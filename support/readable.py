@@ -26,8 +26,8 @@ WHOLE = _Percent(100)
 """All of what is told in percent."""
 
 
-def unobserved(what: str, done: int, most: int) -> None:
-    """Do nothing: the `ProgressObserver` where nobody wants to know."""
+def unobserved(*told: Any) -> None:
+    """Do nothing: the `ProgressObserver`, or another observer, where nobody wants to know."""
 
 
 class Caution(str):

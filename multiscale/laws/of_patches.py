@@ -74,7 +74,7 @@ def consistent_laws(
     tolerance: float = 2e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: ProgressObserver = unobserved,
+    observe: ProgressObserver | None = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
@@ -116,7 +116,7 @@ def consistent_laws(
         displacements=displacements or (lambda pressures: pressures @ compliance.T),
         tilt=largest.tilt,
         comm=comm,
-        observe=lambda rows: observe("rows of laws", rows, most_rows),
+        observe=lambda rows: (observe or unobserved)("rows of laws", rows, most_rows),
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
@@ -400,7 +400,7 @@ def isolated_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: ProgressObserver = unobserved,
+    observe: ProgressObserver | None = None,
 ) -> LawTable:
     """Tabulate the isolated laws of all patches.
 
@@ -438,7 +438,7 @@ def isolated_laws(
         return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
     def made(done: int) -> None:
-        observe("laws of patches", done, count)
+        (observe or unobserved)("laws of patches", done, count)
 
     laws = tuple(shared(comm, count, make, costs=costs, observe=made))
     return LawTable(

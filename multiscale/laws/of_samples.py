@@ -69,7 +69,7 @@ def representative_law(
     before: PatchLaw | None = None,
     leak: bool = False,
     comm: Comm | None = None,
-    observe: ProgressObserver = unobserved,
+    observe: ProgressObserver | None = None,
 ) -> PatchLaw:
     """Tabulate the law of a face that is much larger than the samples of its roughness.
 
@@ -126,7 +126,7 @@ def representative_law(
     face = PeriodicSamples(
         samples=tuple(_checked(sample, make, _ROW_ERROR * tolerance) for sample in samples),
         comm=comm,
-        observe=lambda rows: observe("rows of laws", rows, most_rows),
+        observe=lambda rows: (observe or unobserved)("rows of laws", rows, most_rows),
     )
     law = face.law(pressure, closure, tolerance, most_rows, before)
     return face.with_leak(law, before) if leak else law

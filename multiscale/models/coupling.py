@@ -225,6 +225,7 @@ class Coupling(ABC):
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
         start: What the first load step starts from, see `state`; set it before the model is made.
+        told: What errors of load steps so far told once for later ones.
         extensions: What is said of laws that load steps needed further.
     """
 
@@ -234,6 +235,7 @@ class Coupling(ABC):
         self.clock = Clock()
         self.table: LawTable | None = None
         self.start: Any = None
+        self.told: list[Any] = []
         self.extensions: list[str] = []
 
     @property

@@ -76,9 +76,9 @@ class MeshedContact(Model):
         self,
         meshes: Sequence[RoughMesh],
         patches: PatchGrid,
-        observe: ProgressObserver = unobserved,
+        observe: ProgressObserver | None = None,
     ) -> None:
-        self.meshes, self._patches, self._observe = meshes, patches, observe
+        self.meshes, self._patches, self._observe = meshes, patches, observe or unobserved
         self._last: tuple[FaceEquilibrium, ...] = ()
 
     @property

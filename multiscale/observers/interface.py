@@ -56,7 +56,10 @@ open gap over the temperature jump M: beside contacts gaps go with the distance 
 and the gas from M on there conducts as M^-⅓. On 56 periods of 256² cells, 2 to 43 % in contact, x
 from 0.3 to 440, cells conducted 1.04 to 9.4 times as much as layers. That was at most 1.25 × this
 error, half of it in the median; it was set on the first 28. Twice the layers for all x, the rule
-before, was exceeded by more than 1.5 × on 10."""
+before, was exceeded by more than 1.5 × on 10. On 12 other samples, of which 8 were no period and 8
+three to eight times as long along one axis, 2 to 24 % in contact, x from 1.5 to 600, the true error
+was at most 0.8 × this one; on 8 faces with laws of samples of another roughness (half the slope, or
+without the long or the short waves) at most 1.4 ×."""
 
 _WITHOUT_JUMP = (
     "; as no conductance.temperature_jump is stated (air at 1 bar: about 0.4 um), the most has no "
@@ -206,13 +209,10 @@ class ConductanceObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        for full, why in (
-            (True, "without bound, as the surfaces touch everywhere"),
-            (
-                False,
-                "not found: the mean gap hardly closes, or the linear solution did not converge",
-            ),
-        ):
+        for full, why in {
+            True: "without bound, as the surfaces touch everywhere",
+            False: "not found: the mean gap hardly closes, or a linear solution did not converge",
+        }.items():
             numbers = [number for number, touches in self._unknown.items() if touches is full]
             if numbers:
                 yield (

@@ -28,7 +28,7 @@ from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene, changes, told
 from patchlaw.support import InputError, NotConverged, on_root, place_in, together
 from patchlaw.support.files import append, plain, read_bytes, unsealed, written
-from patchlaw.support.readable import Caution
+from patchlaw.support.readable import Caution, unobserved
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""
@@ -110,7 +110,7 @@ def run_cases(
     comm: Any = None,
     *,
     part: tuple[int, int] = (1, 1),
-    observe: Callable[[Any, CaseResult], object] = lambda case, result: None,
+    observe: Callable[[Any, CaseResult], object] | None = None,
 ) -> dict[int, CaseResult]:
     """Run the cases of a study that are not done yet.
 
@@ -146,7 +146,7 @@ def run_cases(
                 if result.status in REPEATABLE:
                     store(result)
                 mine[ahead[task]] = result
-                observe(case, result)
+                (observe or unobserved)(case, result)
 
         try:
             together(comm, work)

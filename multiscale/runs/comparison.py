@@ -46,7 +46,7 @@ from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support import Array, Comm, check_fields, checked, on_root
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
-from patchlaw.support.readable import Displayed, Table, column, of_columns, times
+from patchlaw.support.readable import Displayed, Table, column, of_columns, times, unobserved
 
 Curves: TypeAlias = Mapping[str, Array]
 """The load steps of a run, see `multiscale.runs.comparison`; empty of one without any."""
@@ -236,8 +236,8 @@ def compare(
     *,
     against: str | None = None,
     folder: str | Path | None = None,
-    observe: Callable[[Configuration, CaseResult], object] = lambda one, result: None,
-    begun: Callable[[Configuration], object] = lambda one: None,
+    observe: Callable[[Configuration, CaseResult], object] | None = None,
+    begun: Callable[[Configuration], object] | None = None,
 ) -> Comparison:
     """Run a scene in every sensible configuration, as a sweep runs its cases.
 
@@ -283,7 +283,7 @@ def compare(
     scene, ways = on_root(comm, chosen)
 
     def solve(one: Configuration, progress: Callable[[], None]) -> CaseResult:
-        begun(one)
+        (begun or unobserved)(one)
         return solved(one, progress)
 
     results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe)

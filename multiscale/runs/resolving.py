@@ -45,7 +45,7 @@ def resolve(
     nodes: ClusterNodes | None = None,
     read: Callable[[Scene, Any], Meshes] | None = None,
     mesh_error: Callable[[Any], float] | None = None,
-    observe: ProgressObserver = unobserved,
+    observe: ProgressObserver | None = None,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
 
@@ -79,7 +79,7 @@ def resolve(
         nodes=nodes or ClusterNodes(),
         read=read or BodyReader(),
         mesh_error=mesh_error or measured_mesh_error,
-        observe=observe,
+        observe=observe or unobserved,
     )
     unmeasured = {"patches.grid"} if scene.law.representative else {"patches.grid", "block.cells"}
     with located(scene.file):

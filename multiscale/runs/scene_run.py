@@ -53,6 +53,7 @@ class Checkpoint:
         steps: The accepted load steps.
         position: Where the load history has come to.
         state: What the coupling's next load step starts from, see `Coupling.state`.
+        told: What errors of these load steps told, see `Coupling.told`.
         contacts: The contacts recorded so far, which count from first touch.
         fields: What makes the states of fields so far again, as numbers of load steps and records.
     """
@@ -64,6 +65,7 @@ class Checkpoint:
     steps: tuple[LoadStep, ...] = ()
     position: Position
     state: Any
+    told: tuple[Any, ...] = ()
     contacts: tuple[ContactRecord, ...] = ()
     fields: tuple[tuple[int, Any], ...] = ()
 
@@ -164,10 +166,10 @@ class Run:
         scene: Scene,
         comm: Comm | None = None,
         stated: Scene | None = None,
-        observe: ProgressObserver = unobserved,
+        observe: ProgressObserver | None = None,
     ) -> None:
         self.clock = Clock()
-        self.clock.observe = observe
+        self.clock.observe = observe or unobserved
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = Position()
@@ -254,6 +256,7 @@ class Run:
             steps=tuple(self.steps),
             position=self.position,
             state=state,
+            told=tuple(self.coupling.told),
             contacts=tuple(self.observers.contacts.records),
             fields=tuple(self.observers.fields.records.items()),
         )
@@ -265,7 +268,7 @@ class Run:
             kept: The run after these load steps.
         """
         self.steps, self.position = list(kept.steps), kept.position
-        self.coupling.start = kept.state
+        self.coupling.start, self.coupling.told = kept.state, list(kept.told)
         if kept.laws:
             from patchlaw.multiscale.laws.law_table import read_laws
 
@@ -347,9 +350,7 @@ def run(
     Note:
         Collective.
     """
-    with (
-        run_progress(comm, scene.loading) if progress else nullcontext((None, unobserved)) as shown
-    ):
+    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
         advance, at = shown
         whole = Run(scene, comm, observe=at)
         try:

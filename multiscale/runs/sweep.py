@@ -193,7 +193,7 @@ def sweep(
     *,
     folder: str | Path | None = None,
     part: tuple[int, int] = (1, 1),
-    observe: Callable[[Case, CaseResult], object] = lambda case, result: None,
+    observe: Callable[[Case, CaseResult], object] | None = None,
     progress: bool = False,
 ) -> SweepResults:
     """Run a scene for all combinations of values of its keys.

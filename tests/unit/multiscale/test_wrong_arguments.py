@@ -64,6 +64,15 @@ def test_every_argument_of_every_public_name_is_tried():
         assert set(sections) <= tried | {"steps"}, name
 
 
+def test_nobody_need_be_told_of_progress():
+    told = [
+        inspect.signature(use).parameters[name].default
+        for use, _, arguments in CALLS.values()
+        for name in arguments.keys() & {"observe", "begun"}
+    ]
+    assert told == [None] * 7  # of six functions, so that what wraps them passes None on
+
+
 @pytest.mark.parametrize("value", [2, np.float32(2.0), np.int64(2), np.array(2.0)])
 def test_numbers_of_numpy_are_numbers(value):
     assert Control(force=value) == Control(force=2.0)

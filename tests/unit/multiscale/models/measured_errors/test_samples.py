@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+from helpers.resumed_runs import gone_on, ran_past
 from scipy.stats import norm
 
 from patchlaw.geometry import BlockShape, Control
@@ -323,7 +324,7 @@ def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
 
 
 @pytest.mark.long
-def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monkeypatch):
+def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monkeypatch, tmp_path):
     made, own = [], other_elements.face_on
 
     def face_on(*given, **options):
@@ -332,15 +333,20 @@ def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monk
 
     monkeypatch.setattr(other_elements, "face_on", face_on)
     known = scene(mesh, output={"check": "all"})
-    whole = Run(known)
-    kept = list(whole.load_steps())
+    path = tmp_path / "checkpoint.state"
+    whole = ran_past(known, 1, path)
+    kept = whole.steps
     assert len(made) == 2  # with quadratic elements, and with more points
     assert set(whole.coupling._elsewhere) == {"finer", "nearer", "quadratic"}
     whole.close()
     assert not whole.coupling._elsewhere
+    again, (last,) = gone_on(known, path)
+    again.close()  # what the first load step told is in the checkpoint
+    assert dict(last.errors) == pytest.approx(dict(kept[-1].errors), rel=1e-6)
+    made.clear()
     monkeypatch.setattr(law_errors, "_MOST_KEPT_UNKNOWNS", 0)
     fresh = run(known).steps
-    assert len(made) == 2 + len(fresh) + 1  # quadratic elements tell those of both load steps
+    assert len(made) == len(fresh) + 1  # quadratic elements tell those of both load steps
     for one, other in zip(kept, fresh, strict=True):
         abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
         assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
