@@ -43,6 +43,7 @@ class FaceContact(LawModel):
             that are written with the other fields; collective.
         slips_before: What load steps left behind of friction before the latest one.
         rubs: Coefficients of friction of the laws of faces that slide as wholes, (N,); None: none.
+        in_proportion: Measured errors that later load steps are told by, see `LawErrorProbe`.
     """
 
     on_mesh = True
@@ -61,6 +62,7 @@ class FaceContact(LawModel):
         self.face = face
         self.slips_before: Any = None
         self.rubs: Array | None = None
+        self.in_proportion: list[tuple[Any, ...]] = []
         self._last: FaceEquilibrium | None = None
         self._take(problem, table)
 
@@ -396,7 +398,7 @@ class FaceContact(LawModel):
         return Stiffness(value if np.isfinite(value) else None, iterations)
 
     def state(self) -> Any:
-        """Return the latest plane, pressures and sliders, which determine the displacements."""
+        """Return what determines the latest displacements, and what later errors are told by."""
         last = self._last
         if last is None:
             return None
@@ -404,7 +406,8 @@ class FaceContact(LawModel):
         left: Any = None if sliders is None else sliders.record()
         if self.wears:
             left = [self._problem.forces.record_of_wear, *self._slid, left]
-        return last.approach, last.tilt, last.patch_pressure, self._problem.stated.body_state, left
+        loaded = last.patch_pressure, self._problem.stated.body_state
+        return last.approach, last.tilt, *loaded, left, tuple(self.in_proportion)
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -416,9 +419,10 @@ class FaceContact(LawModel):
         shear; on the former 7e-14 under residuals of 1e-11, for 6 to 16 % more linear iterations.
         """
         if state is not None:
-            slips = state[-1]
+            *_, slips, known = state
+            self.in_proportion = list(known)
             if self.wears:
-                self._problem.forces.record_of_wear, *slid, slips = state[-1]
+                self._problem.forces.record_of_wear, *slid, slips = slips
                 self._slid = Slid(*slid)
             if self._problem.sliders and slips is not None:
                 self._problem.sliders.restore(slips)
@@ -426,7 +430,7 @@ class FaceContact(LawModel):
 
     def _solve_again(self, state: Any) -> None:
         """Find an equilibrium again, where nothing slips further."""
-        approach, tilt, pressure, body_state, _ = state
+        approach, tilt, pressure, body_state, *_ = state
         sliders, forces, shear = self._problem.sliders, self._problem.forces, None
         memory, worn, forces.slip_wear = self.slips, forces.slip_wear, None
         if sliders is not None:

@@ -66,7 +66,6 @@ class RepresentativeCoupling(Coupling):
         super().__init__(parts, comm, meshes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
         self._elsewhere: dict[str, tuple[Any, Any, Any]] = {}
-        self._in_proportion: dict[str, dict[tuple[Any, ...], Array]] = {}
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face
             with located(self.scene.file, "counter_body.contact"):
@@ -135,7 +134,7 @@ class RepresentativeCoupling(Coupling):
             "new_laws": model.table.laws,
             "zero": self.parts.zero_error,
             "elsewhere": self._elsewhere,
-            "in_proportion": self._in_proportion,
+            "in_proportion": model.in_proportion,
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,

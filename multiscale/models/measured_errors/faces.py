@@ -95,8 +95,9 @@ class LawErrorProbe(SampleProbe):
         new_laws: The laws of the samples before they wore; of new samples those of `table`.
         zero: Error of the height that approaches count from [mm].
         elsewhere: By name other faces of small bodies, each with laws and the problem there.
-        in_proportion: By cause, force and other loads errors of force, area, gap and stiffness,
-            over these and over the stiffness against the approach, shape (4,) [mm/N].
+        in_proportion: Errors that are kept for later load steps, each as a cause, the force [N],
+            the other loads, and the errors of force, area, gap and stiffness over these and over
+            the stiffness against the approach, shape (4,) [mm/N].
     """
 
     problem: LawContactProblem
@@ -108,7 +109,7 @@ class LawErrorProbe(SampleProbe):
     new_laws: Sequence[PatchLaw]
     zero: float = 0.0
     elsewhere: dict[str, tuple[Any, Any, Any]] = field(default_factory=dict)
-    in_proportion: dict[str, dict[tuple[Any, ...], Array]] = field(default_factory=dict)
+    in_proportion: list[tuple[Any, ...]] = field(default_factory=list)
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
     _read_under: dict[float, Array] = field(default_factory=dict, init=False)
 
@@ -362,15 +363,17 @@ class LawErrorProbe(SampleProbe):
             kind: What displaces.
             measure: Returns the errors of the answer.
         """
-        force, known = self.state.force, self.in_proportion.setdefault(kind, {})
-        sizes, control = self.response.stiffness * np.abs(self.answer[:4]), self.control
-        state = control.body_state, control.tilt, control.moment
-        for (at, *loaded), errors in known.items():
-            same = tuple(loaded) == state and not self.worn
-            if same and max(at / force, force / at) <= _SAME_FORCE:
-                return np.append(errors * sizes, np.zeros(len(self.answer) - 4))
+        if self.worn:
+            return measure()
+        force, control = self.state.force, self.control
+        sizes = self.response.stiffness * np.abs(self.answer[:4])
+        own = tuple(map(float, (control.body_state, *(control.tilt or ()), *control.moment)))
+        for cause, at, loads, share in self.in_proportion:
+            if (cause, loads) == (kind, own) and max(at / force, force / at) <= _SAME_FORCE:
+                return np.append(share * sizes, np.zeros(len(self.answer) - 4))
         errors = measure()
-        known[force, *state] = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
+        share = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
+        self.in_proportion.append((kind, force, own, share))
         return errors
 
     @cached_property

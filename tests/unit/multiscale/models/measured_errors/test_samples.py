@@ -22,7 +22,9 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     omission_notes,
 )
 from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from patchlaw.support import InputError, NotConverged
+from patchlaw.support.files import write_record
 from patchlaw.support.readable import quantity
 
 CELLS = (4, 3, 2)
@@ -344,6 +346,21 @@ def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monk
     for one, other in zip(kept, fresh, strict=True):
         abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
         assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
+
+
+@pytest.mark.long
+def test_a_run_that_goes_on_states_the_errors_of_one_that_was_not_stopped(mesh, tmp_path):
+    """Errors in proportion to those of the first load step are known after it, too."""
+    whole = Run(scene(mesh, output={"check": "all"}))
+    steps = whole.load_steps()
+    next(steps)
+    file = write_record(tmp_path / "kept", whole.checkpoint(whole.coupling.state()))
+    list(steps)
+    again = Run(whole.scene)
+    again.resume(read_checkpoint(file))
+    list(again.load_steps())
+    found, wanted = (dict(one.steps[-1].errors) for one in (again, whole))
+    assert found == pytest.approx(wanted, rel=1e-7, abs=1e-9 * whole.steps[-1].force_N)
 
 
 def test_other_elements_whose_contact_fails_are_not_used_again():
