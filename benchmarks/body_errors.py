@@ -15,7 +15,8 @@ With `--read` level bodies are pressed by a force: those of `--shapes`, by defau
 gap and stiffness of the interface are compared with quadratic elements on every cell cut into
 eight. With `--friction` bodies are sheared in part besides, every other one by a shear force, and
 shear and energy lost to friction are compared, too. `--steep` takes 3 % of the slopes of the
-roughness.
+roughness. With `--every` all load steps of a path are compared, which leads back where nothing
+rubs, `--most` being the degrees of freedom of the finest elements.
 """
 
 import os
@@ -66,6 +67,8 @@ ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform s
 
 MOST_TRUE = 50_000  # degrees of freedom of the finest elements
 MOST_SHEARED = 30_000  # degrees of freedom of the finest elements under friction
+LOADS = np.array([0.25, 1.0, 0.45])  # of the load: up, and back in part
+UNIFORM = 1e-6  # what is read off a uniform state, which has no error, differs less by rounding
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 OF = Discretised.of
 
@@ -150,13 +153,14 @@ def shape_of(body, shape):
     return replace(body, size=max(body.size, body.length / fewest), tilt=(0.0, 0.0), **changes)
 
 
-def read_off(seed, folder, shapes, rubs, steep):
+def read_off(seed, folder, choice):
     """Press a rough body, and shear it in part where it rubs.
 
     Returns:
-        Its name, its unknowns, and by quantity the stated and the true error, relative; None for
-        others and large ones.
+        Its name, its unknowns, and of every load step by quantity the stated and the true error,
+        relative; None for others and large ones.
     """
+    shapes, rubs = tuple(choice.shapes), choice.friction
     shape, body = shapes[seed % len(shapes)], drawn(seed)
     if shapes == SHAPES and body.tilt is not None and any(body.tilt):
         return None
@@ -165,7 +169,7 @@ def read_off(seed, folder, shapes, rubs, steep):
     unknowns = 3 * coarse.mesh.geometry.index_map().size_global
     truth = refined(coarse)
     vertices = 3 * truth.mesh.geometry.index_map().size_global
-    if 8 * vertices > MOST_SHEARED:
+    if 8 * vertices > choice.most:
         return None
     mesh, finer = (str(Path(folder) / f"{name}.xdmf") for name in (seed, f"{seed} finer"))
     write_mesh(coarse, mesh)
@@ -175,7 +179,7 @@ def read_off(seed, folder, shapes, rubs, steep):
     data = dict(rough_scene(body, mesh, seed, accuracy=0.05).written)
     del data["accuracy"]  # the body stays as it is
     data["surface"] = {**data["surface"], "grid": [32, 32]}
-    if steep:
+    if choice.steep:
         spectrum = data["surface"]["spectrum"]
         data["surface"]["spectrum"] = spectrum | {"rms_slope": 0.03 * spectrum["rms_slope"]}
     data["body"] = {**data["body"], "element": ("linear", "quadratic")[body.order - 1]}
@@ -183,48 +187,59 @@ def read_off(seed, folder, shapes, rubs, steep):
     if rubs:
         data |= {"friction": {"coefficient": coefficient}}
 
-    def step_of(size=0.0, key="shear", check="none", **sections):
+    def steps_of(size=0.0, key="shear", check="none", **sections):
         shear = [[size * float(np.cos(way)), size * float(np.sin(way))]]
         sections["load"] = data["load"] | ({key: shear, "shear_steps": 2} if rubs else {})
+        if choice.every:
+            sections["load"]["steps"] = 3
+        if choice.every and not rubs:
+            sections["load"]["pressure"] = (LOADS * body.pressure).tolist()
         sections["output"] = {**data["output"], "check": check}
-        run = Run(Scene.from_dict(data | sections))
-        *_, step = run.load_steps()
-        stiffness = run.coupling.model.stiffness().interface
+        run, found = Run(Scene.from_dict(data | sections)), []
+        for step in run.load_steps():
+            stiffness = run.coupling.model.stiffness().interface
+            found.append(replace(step, interface_stiffness_N_per_mm=stiffness))
         run.close()
-        return replace(step, interface_stiffness_N_per_mm=stiffness)
+        return found
 
     size, key = 0.0, "shear_force"
     if rubs:
-        size = share * coefficient * step_of(1e-12).force_N
+        size = share * coefficient * steps_of(1e-12)[-1].force_N
         if seed % 2:  # the shift under it
-            at = step_of(size, key)
+            at = steps_of(size, key)[-1]
             size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
     with measured() as found:
-        step = step_of(size, key, check="last")
-    true = step_of(size, key, body={**data["body"], "mesh": finer, "element": "quadratic"})
-    (errors,) = found
+        steps = steps_of(size, key, check="all" if choice.every else "last")
+    true = steps_of(size, key, body={**data["body"], "mesh": finer, "element": "quadratic"})
+    last = slice(-len(found), None)
+    every = [_compared(*one) for one in zip(found, steps[last], true[last], strict=True)]
+    return body.name.replace("pad", shape), unknowns, every
+
+
+def _compared(errors, step, true):
+    """Return by quantity the stated and the true error of a load step, relative."""
     of_force, of_area, of_gap, of_stiffness = sum(errors.by_cause[c] for c in BY)[:4]
     # the error of the approach is that of the force over the stiffness against it
     force = of_force, errors.stiffness * (true.approach_mm - step.approach_mm), step.force_N
-    area = of_area, *_change(step, true, "contact_area_fraction")
-    gap = of_gap, *_change(step, true, "mean_separation_mm")
     change, own = _change(step, true, "interface_stiffness_N_per_mm")
     by_name = {
         "force": force,
-        "area": area,
-        "gap": gap,
+        "area": (of_area, *_change(step, true, "contact_area_fraction")),
+        "gap": (of_gap, *_change(step, true, "mean_separation_mm")),
         "stiffness": (of_stiffness * own, change, own),
     }
-    if rubs:
-        read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
+    if errors.shear:
+        read = [
+            f"shear_{'force_' * step.by_shift}{k}_{'N' if step.by_shift else 'mm'}" for k in "xy"
+        ]
         one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
         of_shear, of_lost = sum(errors.shear[c] for c in BY)
         by_name["shear"] = of_shear, np.hypot(*(other - one)), np.hypot(*one)
         by_name["energy lost"] = of_lost, *_change(step, true, "dissipated_mJ")
-    relative = {
-        name: np.abs([stated, err]) / abs(of) for name, (stated, err, of) in by_name.items()
+    return {
+        name: np.abs([stated, err]) / (abs(of) or 1.0)
+        for name, (stated, err, of) in by_name.items()
     }
-    return body.name.replace("pad", shape), unknowns, relative
 
 
 def _change(step, true, name):
@@ -248,24 +263,26 @@ def measured():
 
 def reading(choice):
     """Compare stated and true errors of what is read off bodies under laws."""
-    ratios, seed = [], choice.first - 1
+    ratios, seed, bodies = {}, choice.first - 1, 0
     with tempfile.TemporaryDirectory() as folder:
-        while len(ratios) < choice.bodies:
+        while bodies < choice.bodies:
             began = time.process_time()
-            shapes = tuple(choice.shapes)
-            found = read_off(seed := seed + 1, folder, shapes, choice.friction, choice.steep)
+            found = read_off(seed := seed + 1, folder, choice)
             if found is None:
                 continue
-            name, unknowns, errors = found
-            ratios.append(
-                [true / stated if true > ROUNDING else 0.0 for stated, true in errors.values()]
-            )
-            told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors.values())
-            if COMM.rank == 0:
-                took = time.process_time() - began
-                print(f"| {seed} | {name} | {unknowns} | {told} | {took:.0f} s |", flush=True)
-    for name, some in zip(errors, np.transpose(ratios), strict=True):
-        tell(name, some, np.sum(some <= ALLOWED))
+            name, unknowns, every = found
+            for number, errors in enumerate(every, start=1):
+                for quantity, (stated, true) in errors.items():
+                    ratio = true / stated if true > UNIFORM else 0.0
+                    ratios.setdefault(quantity, []).append(ratio)
+                told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors.values())
+                if COMM.rank == 0:
+                    took = time.process_time() - began
+                    row = f"| {seed}, {number} | {name} | {unknowns} | {told} | {took:.0f} s |"
+                    print(row, flush=True)
+            bodies += 1
+    for name, some in ratios.items():
+        tell(name, some, np.sum(np.array(some) <= ALLOWED))
 
 
 def tell(what, ratios, kept):
@@ -285,6 +302,8 @@ def main():
     parser.add_argument("--read", action="store_true")
     parser.add_argument("--friction", action="store_true")
     parser.add_argument("--steep", action="store_true")
+    parser.add_argument("--every", action="store_true")
+    parser.add_argument("--most", type=int, default=MOST_SHEARED)
     parser.add_argument("--shapes", nargs="+", choices=(*SHAPES, "block"), default=SHAPES)
     parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])
     choice = parser.parse_args()

@@ -97,7 +97,7 @@ class LawErrorProbe(SampleProbe):
         elsewhere: By name other faces of small bodies, each with laws and the problem there.
         in_proportion: What was measured once, see `Coupling.told`: force, errors of force, area,
             gap and stiffness over these and over the stiffness against the approach, shape (4,)
-            [mm/N], cause and other loads.
+            [mm/N], cause and state of the bodies' loads.
     """
 
     problem: LawContactProblem
@@ -355,23 +355,24 @@ class LawErrorProbe(SampleProbe):
         """Return errors by displacements in proportion to the pressures, measured once.
 
         Force, area and gap err by these in proportion to the stiffness besides. They are measured
-        again where the force is another one, where bodies and plane are loaded otherwise, and where
-        pressures move as the face wears. The shear errs by the part that the force does, see
-        `LawShearProbe`.
+        again where the force is another one, where the bodies are loaded otherwise, and where
+        pressures move, as under planes that tilt and on faces that wear. The shear errs by the part
+        that the force does, see `LawShearProbe`.
 
         Args:
             kind: What displaces.
             measure: Returns the errors of the answer.
         """
-        force, control = self.state.force, self.control
+        if self.worn or self.control.tilt != (0.0, 0.0):
+            return measure()
+        force, own = self.state.force, (kind, float(self.control.body_state))
         sizes = self.response.stiffness * np.abs(self.answer[:4])
-        here = kind, control.body_state, control.tilt, control.moment
-        for at, errors, *own in self.in_proportion:
-            if tuple(own) == here and not self.worn and max(at / force, force / at) <= _SAME_FORCE:
-                return np.append(errors * sizes, np.zeros(len(self.answer) - 4))
+        for at, shares, *of in self.in_proportion:
+            if tuple(of) == own and max(at / force, force / at) <= _SAME_FORCE:
+                return np.append(shares * sizes, np.zeros(len(self.answer) - 4))
         errors = measure()
         shares = np.divide(errors[:4], sizes, out=np.zeros(4), where=sizes > 0.0)
-        self.in_proportion.append((force, shares, *here))
+        self.in_proportion.append((force, shares, *own))
         return errors
 
     @cached_property
