@@ -258,6 +258,9 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         found = self.of_records(name)
         return found if name in _MAPS else found[0]
 
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *_OF_STEPS, *FIELDS]
+
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
 

@@ -108,6 +108,7 @@ def test_contacts_and_fields_say_what_they_are():
     assert isinstance(both[1:], ContactHistory) and both[1:].force_N.tolist() == [50.0]
     slips = replace(record, slipping=np.eye(2, dtype=bool))
     assert ContactHistory(records=(slips, slips)).slipping.shape == (2, 2, 2)
+    assert {"force_N", "slip_mm"} <= set(dir(both))
     with pytest.raises(AttributeError, match="no attribute 'slips'"):
         _ = both.slips
     fields = BodyFields(
