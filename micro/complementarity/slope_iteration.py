@@ -219,10 +219,8 @@ _FIRST = 1e-2
 """Residual of the first solution, before finite slopes are known."""
 _AHEAD = 2e-2
 """Residual of a solution over the last change by finite slopes: about what the next change is."""
-_CAUTION = 2.0
-"""Factor on the rate at which changes by finite slopes fell last, for the next one. On 14 scenes of
-five load steps 4 took 267 evaluations of finite slopes, 2 takes 259, and forces and approaches err
-by 5e-10 at most with either; with 1, 250 and 2.5e-9."""
+_CAUTION = 4.0
+"""Factor on the rate at which changes by finite slopes fell last, for the next one."""
 _BY_SLOPES = 0.1
 """Largest part of the displacements that finite slopes add."""
 _CONVERGED, _EXPECTED = 3e-9, 1e-9
@@ -232,11 +230,10 @@ both a force under a hardness erred by 1e-8 after unloading, with 1e-9 by 7e-11.
 _PART = 0.1
 """Residual of a solution over the last change, at most: the mixing takes differences of changes.
 Without it a plane 800 µm into heights of 10 µm took 2070 iterations, with it 216."""
-_AGAIN = 0.4
+_AGAIN = 0.2
 """Residual of a solution over the change expected next, at most: it adds to the one after that. On
-eight surfaces of 128² to 256² cells, two of which yield and two of which are periodic, half of it
-took 159 evaluations of finite slopes where five times as much took 177, and as many products, with
-a caution of 4."""
+eight surfaces of 128² to 256² cells, two of which yield and two of which are periodic, it took 159
+evaluations of finite slopes where 1 took 177, and as many products."""
 _MEMORY = 2
 """Steps that the mixing remembers."""
 _NOISE = 2.0

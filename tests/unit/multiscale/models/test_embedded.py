@@ -68,11 +68,11 @@ def test_steps_read_the_laws_at_their_closures():
 def test_closure_beyond_a_law_is_refused_and_the_state_stays():
     coupling = embedded(law(), law(end=0.5))
     with pytest.raises(ValueError, match="no load step"):
-        _ = coupling.displacement
+        _ = coupling.solved
     coupling.press(Control(approach=0.4))
     with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .*closure up to 0.5 mm"):
         coupling.press(Control(approach=0.8))
-    np.testing.assert_array_equal(coupling.displacement, [0.4])
+    np.testing.assert_array_equal(coupling.solved[1].displacement, [0.4])
 
 
 @pytest.mark.parametrize(
