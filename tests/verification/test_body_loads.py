@@ -138,7 +138,7 @@ def reaction(whole):
     """Return the force that supports bear along the normal, from the whole displacements."""
     solver = whole.coupling.model
     moved = solver.face.body.stiffness.createVecRight()
-    moved.array[:] = solver.displacement
+    moved.array[:] = solver.solved[1].displacement
     return solver.face.body.reaction(moved)
 
 
