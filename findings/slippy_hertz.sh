@@ -8,14 +8,9 @@
 # 10 by 20 mm in a groove of 50 mm has half axes of 1.59 to 1 in place of 1.37 to 1. The mean pressure of an ellipse is the greatest one over
 # the area (1e7 times it), that of a line twice the true one and more than the greatest. Spheres are right.
 set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-pip() { "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "$@"; }
-pip numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2 sympy==1.14.0 # the last that slippy runs with
-pip --no-deps slippy==0.5.2
-cd "$folder"
-venv/bin/python - <<'END' 2>warnings.log
+ALONE=slippy==0.5.2 # with the last packages that it runs with
+source "$(dirname "$0")/packages.sh" numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2 sympy==1.14.0
+python - <<'END' 2>warnings.log
 import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk

@@ -7,14 +7,9 @@
 # difference gives the 0.310. The function stress_f of a line returns thousands of times the pressure, by the length of the half width. Of
 # spheres take the axis, of lines the pressure alone.
 set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-pip() { "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "$@"; }
-pip numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2 sympy==1.14.0 # the last that slippy runs with
-pip --no-deps slippy==0.5.2
-cd "$folder"
-venv/bin/python - <<'END' 2>warnings.log
+ALONE=slippy==0.5.2 # with the last packages that it runs with
+source "$(dirname "$0")/packages.sh" numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2 sympy==1.14.0
+python - <<'END' 2>warnings.log
 import numpy as np
 
 np.float, np.product = float, np.prod  # names that slippy takes from an older numpy

@@ -6,14 +6,9 @@
 # points -2 %, and waves whose area is 2.4 % more have 0.38 %. sds is summits per point: the same waves have a quarter
 # of it at half the spacing. Divide it by the area of a point.
 set -euo pipefail
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-pip() { "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "$@"; }
-pip numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2 # the last that slippy runs with
-pip --no-deps slippy==0.5.2
-cd "$folder"
-venv/bin/python - <<'END' 2>warnings.log
+ALONE=slippy==0.5.2 # with the last packages that it runs with
+source "$(dirname "$0")/packages.sh" numpy==1.26.4 scipy==1.11.4 matplotlib==3.8.4 numba==0.61.2 tinydb==4.8.2
+python - <<'END' 2>warnings.log
 import numpy as np
 import slippy
 from slippy.surface import Surface
