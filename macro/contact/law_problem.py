@@ -533,9 +533,11 @@ class LawContactProblem:
         sliders, found = self.sliders, None
         if sliders is not None and before is not None:
             at, memory = self._lines_at(self._closure), sliders.memory
-            sliders.restore(before)
-            found = sliders.at_slip(*at, memory.path[:, -1, 1:])
-            sliders.memory = memory
+            try:
+                sliders.restore(before)
+                found = sliders.at_slip(*at, memory.path[:, -1, 1:])
+            finally:
+                sliders.memory = memory
         with self._prescribed(self._with_pulls(control)):
             self._linearised(found)
             return self._moved_by(load, _OF_CHANGE)[0]
