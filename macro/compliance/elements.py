@@ -290,6 +290,36 @@ class ProductStiffness:
         Raises:
             NotConverged: When the iteration does not end.
         """
+        _, solved = self._displaced_by(loads, _RESIDUAL)
+        tops = [
+            np.einsum("abcm,c->abm", part, component[2].last)
+            for part, component in zip(self._parts(solved), self.lines, strict=True)
+        ]
+        return tops, solved
+
+    def works(self, load: Array) -> Array:
+        """Return the works of loads along z on what each of them displaces, (m, m) [N mm].
+
+        From displacements that leave a residual they follow to its square, as the stiffness is
+        symmetric: half the iterations will do.
+
+        Args:
+            load: Forces on products of functions along x and y on the last points, (m, nx, ny) [N].
+
+        Raises:
+            NotConverged: When the iteration does not end.
+        """
+        forces, solved = self._displaced_by({2: load}, math.sqrt(_RESIDUAL))
+        half = solved.T @ (forces - 0.5 * self._forces(solved))
+        return np.asarray(half + half.T)
+
+    def _displaced_by(self, loads: Mapping[int, Array], residual: float) -> tuple[Array, Array]:
+        """Return forces on all functions by loads, and their coefficients, (unknowns, m) both.
+
+        Args:
+            loads: As for `solve`.
+            residual: Residual that is left, see `_RESIDUAL`.
+        """
         twins = self._mirror_images(loads)
         count, unknowns, first = len(twins), int(self._splits[-1]), 0
         forces = np.zeros((unknowns, count))
@@ -300,18 +330,13 @@ class ProductStiffness:
             first += len(load)
         alone, place = np.unique(twins, return_inverse=True)
         parts = -(-len(alone) * unknowns // _BATCH)
-        solved = np.concatenate(
-            [self._solved(part) for part in np.array_split(forces[:, alone], parts, axis=1)], axis=1
-        )[:, place]
+        split = np.array_split(forces[:, alone], parts, axis=1)
+        solved = np.concatenate([self._solved(part, residual) for part in split], axis=1)[:, place]
         if len(mirrored := np.flatnonzero(twins != np.arange(count))):
             u, v, w = (part[..., mirrored].swapaxes(0, 1) for part in self._parts(solved))
             for part, image in zip(self._parts(solved), (v, u, w), strict=True):
                 part[..., mirrored] = image
-        tops = [
-            np.einsum("abcm,c->abm", part, component[2].last)
-            for part, component in zip(self._parts(solved), self.lines, strict=True)
-        ]
-        return tops, solved
+        return forces, solved
 
     def _mirror_images(self, loads: Mapping[int, Array]) -> Indices:
         """Return for each load the first one that is the same with x and y exchanged, or itself.
@@ -342,13 +367,24 @@ class ProductStiffness:
             the logarithm of the height, shape (m, m).
         """
         # integrals over z grow as the height, and slopes along z as its inverse
-        parts, changed = self._parts(solved), np.empty_like(solved)
-        for i, (part, change) in enumerate(zip(parts, self._parts(changed), strict=True)):
+        return np.asarray(solved.T @ self._forces(solved, (1.0, 0.0, -1.0)))
+
+    def _forces(self, solved: Array, by_slopes: Sequence[float] = (1.0, 1.0, 1.0)) -> Array:
+        """Return the forces that displace, or sums of their parts, shape (unknowns, m).
+
+        Args:
+            solved: Coefficients of the displacements, shape (unknowns, m).
+            by_slopes: Factors on what has no slope along z, one, and two.
+        """
+        parts, forces = self._parts(solved), np.empty_like(solved)
+        none, one, two = by_slopes
+        for i, (part, force) in enumerate(zip(parts, self._parts(forces), strict=True)):
             x, y, z = self._stretched[i]
-            change[:] = (x + y - z)[..., None] * part
-            if i < 2:
-                change += self._coupled(i, 1 - i, parts[1 - i])
-        return np.asarray(solved.T @ changed)
+            force[:] = (none * (x + y) + two * z)[..., None] * part
+            for j in {0, 1, 2} - {i}:
+                if factor := one if 2 in (i, j) else none:
+                    force += factor * self._coupled(i, j, parts[j])
+        return forces
 
     def _modulus(self, component: int, axis: int) -> float:
         return self._lame + 2.0 * self._shear if axis == component else self._shear
@@ -396,14 +432,14 @@ class ProductStiffness:
                 scaled[i] = scale * own
         return done
 
-    def _solved(self, forces: Array) -> Array:
-        """Solve for the coefficients by forces, shape (unknowns, m) both."""
+    def _solved(self, forces: Array, left: float) -> Array:
+        """Solve for the coefficients by forces, shape (unknowns, m) both, to a residual."""
         forwards, backwards = range(3), range(2, -1, -1)
         scale = np.concatenate([part.ravel() for part in self._scale])[:, None]
         residual = self._swept(forces * scale, forwards)
         solution, way = np.zeros_like(residual), residual.copy()
         square = np.einsum("nm,nm->m", residual, residual)
-        goal = _RESIDUAL**2 * square
+        goal = left**2 * square
         for _ in range(_MOST_ITERATIONS):
             if np.all(square <= goal):
                 return scale * self._swept(solution, backwards)

@@ -49,6 +49,8 @@ class Response(NamedTuple):
         yy: Strains along y [mm²/MPa].
         xy: Shear strains ε_xy, half the change of the angle [mm²/MPa].
         growth: Derivative of ``normal`` with respect to the height of the block [mm²/MPa].
+
+    What is not asked for is NaN.
     """
 
     normal: Array
@@ -101,6 +103,12 @@ class ParityBlock:
             xy=0.5 * (along_y + along_x),
             growth=growth.reshape(*sizes, *sizes),
         )
+
+    def normal_response(self) -> Response:
+        """Return the displacements downwards alone of the top by the modes of the parity."""
+        shape = 2 * self._counts(2)
+        normal = self._stiffness.works(self._modes(2)).reshape(shape)
+        return Response(normal, *[np.full(shape, np.nan)] * (len(Response._fields) - 1))
 
     def traction_response(self) -> list[list[Array]]:
         """Return the displacements of the top by modes of traction along x and y.
@@ -201,7 +209,7 @@ class FaceCompliance:
         normal: C, downwards, symmetric, shape (K², K²) [mm/N].
         growth: Derivative of C with respect to the block's height, symmetric, (K², K²) [1/N].
         stresses: The same for the stresses σ_xx, σ_yy and σ_xy in the face, shape (3, K², K²)
-            [1/mm²].
+            [1/mm²]; these two are NaN where C alone was asked for.
         rough: C off by the error of the elements; NaN where that is not known, None where there is
             none.
     """
@@ -236,6 +244,7 @@ def face_compliance(
     count: int,
     comm: Any,
     *,
+    normal_alone: bool = False,
     use_cache: bool = False,
 ) -> FaceCompliance:
     """Solve for the response of a block's top to every mode of pressure.
@@ -251,6 +260,7 @@ def face_compliance(
         sides: Support of the block's sides.
         count: Modes K along a side of the top.
         comm: MPI communicator; None for this process alone.
+        normal_alone: Whether C alone is wanted, which takes half the time.
         use_cache: Whether to read the result from the cache on disk, or to write it there.
 
     Returns:
@@ -265,8 +275,9 @@ def face_compliance(
     """
     if use_cache:
         block = (lengths, height, material, sides, count)
-        compute = lambda: face_compliance(*block, comm).arrays  # noqa: E731
-        return FaceCompliance(**cached("face", block, compute, comm))
+        solve = partial(face_compliance, *block, comm, normal_alone=normal_alone)
+        key = (*block, normal_alone)
+        return FaceCompliance(**cached("face", key, lambda: solve().arrays, comm))
     if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
         raise InputError(
             "the block has no such size", value=(*lengths, height), allowed="lengths > 0 mm"
@@ -280,7 +291,8 @@ def face_compliance(
         families.remove((1, 0))
 
     of = partial(ParityBlock, lines, height, material, sides)
-    parts = shared(comm, len(families), lambda index: of(families[index]).response())
+    response = ParityBlock.normal_response if normal_alone else ParityBlock.response
+    parts = shared(comm, len(families), lambda index: response(of(families[index])))
     responses = dict(zip(families, parts, strict=True))
     if alike and count > 1:  # exchange x and y
         exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in responses[0, 1]))

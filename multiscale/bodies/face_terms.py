@@ -118,12 +118,14 @@ class FiniteBody(ABC):
     held: Sequence[tuple[float, float] | None] = ()
 
     @abstractmethod
-    def solve(self, comm: Any, count: int) -> FaceCompliance:
+    def solve(self, comm: Any, count: int, normal_alone: bool = False) -> FaceCompliance:
         """Return the compliance of the face in modes.
 
         Args:
             comm: MPI communicator; None for this process alone.
             count: Modes K along a side.
+            normal_alone: Whether its displacements alone are wanted; a block then takes half the
+                time.
 
         Note:
             Collective.
@@ -160,7 +162,9 @@ class FiniteBody(ABC):
         half_space = half_space_modes(self.lengths, face.count)
         if self.side_term is not None:
             half_space = half_space + side_modes(self.side_term, face.count)
-        without = half_space / self.material.contact_modulus - (higher or 0.0) * face.growth
+        without = half_space / self.material.contact_modulus
+        if higher:
+            without = without - higher * face.growth
         rough = None if face.rough is None else face.rough - without
         origin = -self.margin, -self.margin
         return BodyModes(self.lengths, face.normal - without, origin, rough)
@@ -288,7 +292,11 @@ class FaceTerms:
         else:
             # of 4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 %
             count = max(count, min(2 * max(patches.grid), 32))
-        correction = self.term(self.face(comm, modes=count))
+        if count == self.modes:
+            faces = self.face(comm)
+        else:
+            faces = tuple(one.solve(comm, count, normal_alone=True) for one in self.bodies)
+        correction = self.term(faces)
         return np.asarray(half_space + correction.patch_compliance(patches))
 
 
@@ -354,12 +362,12 @@ class _BlockBody(FiniteBody):
     shape: BlockShape
     sides: Sides
 
-    def solve(self, comm: Any, count: int) -> FaceCompliance:
+    def solve(self, comm: Any, count: int, normal_alone: bool = False) -> FaceCompliance:
         from patchlaw.macro import face_compliance
 
         _check_fits(self.shape, count)
         whole = self.lengths, self.shape.height, self.material, self.sides, count, comm
-        return face_compliance(*whole, use_cache=True)
+        return face_compliance(*whole, normal_alone=normal_alone, use_cache=True)
 
     def tractions(self, comm: Any) -> TractionModes:
         from patchlaw.macro import face_tractions
@@ -510,7 +518,7 @@ class _MeshedBody(FiniteBody):
     around: Surroundings
     opposite: bool
 
-    def solve(self, comm: Any, count: int) -> FaceCompliance:
+    def solve(self, comm: Any, count: int, normal_alone: bool = False) -> FaceCompliance:
         from patchlaw.macro import FaceCompliance
         from patchlaw.macro.compliance import mesh_face
 
