@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -20,14 +21,17 @@ _MOST_CLIMBS, _CLIMBED = 60, 1e-9
 is then right to 1e-18 of the curvature."""
 
 
+@lru_cache(maxsize=64)
 def cell_centres(length: float, count: int) -> Array:
-    """Return the centres of equal cells along a side, shape (count,) [mm].
+    """Return the centres of equal cells along a side, shape (count,), not to be written to [mm].
 
     Args:
         length: The side [mm].
         count: Number of cells.
     """
-    return np.asarray((np.arange(count) + 0.5) * (length / count))
+    centres = (np.arange(count) + 0.5) * (length / count)
+    centres.flags.writeable = False
+    return centres
 
 
 class Interpolant:

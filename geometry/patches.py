@@ -85,8 +85,8 @@ class PatchGrid:
     @property
     def centres(self) -> Array:
         """Centres in flat order, shape (N, 2) [mm]."""
-        along = (0.5 * (at[1:] + at[:-1]) for at in (self.borders_x, self.borders_y))
-        return np.stack([part.ravel() for part in np.meshgrid(*along, indexing="ij")], axis=1)
+        x, y = (0.5 * (at[1:] + at[:-1]) for at in (self.borders_x, self.borders_y))
+        return np.stack([np.repeat(x, len(y)), np.tile(y, len(x))], axis=1)
 
     @checked
     def index_of(self, x: ArrayLike, y: ArrayLike) -> Indices:

@@ -74,6 +74,8 @@ class RememberedSlopes:
         self._fields = np.empty((1, 0, 0))
         # displacements in both orders along directions, and the form of first order from the top
         self._forms = np.zeros((3, _MOST, _MOST))
+        # columns: an order is their products with the directions and transposes
+        self._orders = np.zeros((2, 0, count))
 
     def relearn(self, learnt: list[Array]) -> None:
         """Work out the orders for pressures as another memory did, see `learnt`; bit for bit."""
@@ -112,14 +114,8 @@ class RememberedSlopes:
         Returns:
             Both of shape (n, m); the matrix is that of displacements by unit pressures [mm/MPa].
         """
-        first, second = self._columns(0), self._columns(1)
+        first, second = self._orders
         return (first + self._share(pressure)[0] * second).T, self._few[0, : self._known].T
-
-    def _columns(self, order: int) -> Array:
-        """Return columns: an order is their products with the directions and transposes, (m, n)."""
-        known = slice(self._known)
-        half = 0.5 * self._forms[order, known, known] @ self._few[0, known]
-        return np.asarray((self._few[1 + order, known] - half) / self._per_coarse)
 
     def share_rate(self, pressure: Array) -> tuple[Array, Array]:
         """Return columns a, b: along q the displacements change by a (b · q) as the share does.
@@ -127,7 +123,7 @@ class RememberedSlopes:
         Args:
             pressure: Pressures on the few cells, shape (n,) [MPa].
         """
-        second, directions = self._columns(1), self._few[0, : self._known]
+        second, directions = self._orders[1], self._few[0, : self._known]
         moved = (directions @ pressure) @ second + (second @ pressure) @ directions
         return np.asarray(moved), self._share(pressure)[1]
 
@@ -224,6 +220,8 @@ class RememberedSlopes:
         rows.append(self._fields[0, :end] @ works.ravel())
         for form, row in zip(self._forms, rows, strict=True):
             form[last, :end] = form[:end, last] = row
+        half = 0.5 * self._forms[:2, :end, :end] @ self._few[0, :end]
+        self._orders = (self._few[1:, :end] - half) / self._per_coarse
         self._known = end
 
 

@@ -264,7 +264,7 @@ class HalfSpaceModel:
         depth, worn = (None, None) if before is None else (before.plastic_depth, before.worn_depth)
         (pressure, yielding), displacement, gap, left = self._borne(solved), None, None, None
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
-        if by_slopes is not None and (by_slopes < 0.0).any():
+        if by_slopes is not None and ((by_slopes < 0.0) & (pressure > 0.0)).any():
             below = self.interference(plane, load.lowered)
             warning = raised_by_slopes(pressure, yielding, by_slopes, below)
         if means is None:

@@ -380,8 +380,12 @@ def true_area(contact: Flags, *, periodic: bool) -> Array:
     Source:
         Yastrebov, Anciaux & Molinari 2017, doi 10.1016/j.triboint.2017.04.023.
     """
-    around = np.pad(contact, 1, mode="wrap" if periodic else "edge")
     share, inner = np.empty(contact.shape), slice(1, -1)
+    around = np.empty([count + 2 for count in contact.shape], bool)
+    around[inner, inner] = contact
+    first, last = (-2, 1) if periodic else (1, -2)
+    around[0], around[-1] = around[first], around[last]
+    around[:, 0], around[:, -1] = around[:, first], around[:, last]
 
     def work(rows: slice) -> None:
         here, edges = contact[rows], np.zeros(contact[rows].shape, np.int8)

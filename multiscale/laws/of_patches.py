@@ -239,7 +239,7 @@ class WholeSurface:
                 "initial_separation": float(separation[index]),
                 "warning_pressure": own.warning_pressure,
             }
-            untouched = made.rows.untouched(index, own[:1])
+            untouched = made.rows.untouched(index, own)
             laws.append(PatchLaw(rows=own, untouched=untouched, **ends, **made.of_law(index)))
         return laws
 

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
+from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support import Array
+from patchlaw.support import Array, Indices
 
 Curves = Callable[[LawRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""
@@ -84,7 +84,12 @@ class RowMaker(NamedTuple):
 
 
 def errors_at(
-    guess: LawPoint, stiffness: Array, rows: LawRows, compliance: Array, least: float
+    guess: LawPoint,
+    stiffness: Array,
+    rows: LawRows,
+    compliance: Array,
+    least: float,
+    touched: Indices,
 ) -> Array:
     """Return the errors of the laws of N patches at n rows that they were made without.
 
@@ -92,36 +97,44 @@ def errors_at(
     near first touch do not take all rows.
 
     Args:
-        guess: What the laws give at the approaches of the rows, fields of shape (n, N).
-        stiffness: dp/dδ of the laws with the rows, shape (n, N) [MPa/mm].
+        guess: What the laws of touched patches give at the approaches of the rows, (n, L) each.
+        stiffness: dp/dδ of the laws with the rows, shape (n, L) [MPa/mm].
         rows: The rows, columns of shape (n, N).
         compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
         least: Least mean pressure that errors are relative to [MPa].
+        touched: Indices of L patches, those that touch among them; the others do not err.
 
     Returns:
         Errors of the force over the force; of the N pressures over these, or over the mean pressure
         of all patches that carry load where that is more; and of the N dp/dδ under a plane at δ,
         over the largest of all patches there; shape (n, 1 + 2 N).
     """
+    every, rows, compliance = len(compliance), rows[:, touched], _among(compliance, touched)
     # where a patch loses load to its neighbours, nothing may change with its approach
     lacking = _LEAST_SLOPE - guess.dclosure - np.diag(compliance) * guess.dpressure
     guess = guess._replace(dclosure=guess.dclosure + np.maximum(lacking, 0.0))
     wrong = guess.pressure - rows.pressure
     residual = guess.closure - rows.closure + wrong @ compliance.T
-    for row in range(len(rows)):
-        point = LawPoint(*(field[row] for field in guess))
-        wrong[row] -= point.dpressure * Tangent.of(point, compliance).solve(residual[row])
+    for row, rates in enumerate(guess.dpressure):
+        some = np.flatnonzero(rates)  # no other patch moves any but itself
+        tangent = _among(compliance, some) * rates[some] + np.diag(guess.dclosure[row, some])
+        wrong[row, some] -= rates[some] * np.linalg.solve(tangent, residual[row, some])
     pressure = rows.pressure
-    load = np.maximum(pressure.mean(axis=1), least)
+    load = np.maximum(pressure.sum(axis=1) / every, least)
     carrying = pressure.sum(axis=1) / np.maximum((pressure > 0.0).sum(axis=1), 1)
     scale = np.maximum(pressure, np.maximum(carrying, load)[:, None])
     change = np.abs(_stiffness(guess, compliance) - stiffness)
     largest = stiffness.max(axis=1, keepdims=True)
-    return np.column_stack([
-        np.abs(wrong.mean(axis=1)) / load,
-        np.abs(wrong) / scale,
-        change / np.where(largest > 0.0, largest, 1.0),
-    ])  # fmt: skip
+    errors = np.zeros((len(rows), 1 + 2 * every))
+    errors[:, 0] = np.abs(wrong.sum(axis=1)) / every / load
+    errors[:, 1 + touched] = np.abs(wrong) / scale
+    errors[:, 1 + every + touched] = change / np.where(largest > 0.0, largest, 1.0)
+    return errors
+
+
+def _among(compliance: Array, patches: Indices) -> Array:
+    """Return the compliance of some patches, by their indices."""
+    return compliance[np.ix_(patches, patches)]
 
 
 def _worst(errors: Array) -> Array:
@@ -153,12 +166,12 @@ def refined(
     solve, curves, compliance, initial_separation = make
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
     rows = solve(approaches if end > start else approaches[-1:])
-    patches = np.arange(rows.pressure.shape[1])
+    patches = rows.pressure.shape[1]
     if end <= start or not rows.pressure[-1].any():
-        return Refined(rows, 0.0, np.zeros(len(patches)), np.zeros(len(patches)))
+        return Refined(rows, 0.0, np.zeros(patches), np.zeros(patches))
     least = LEAST_LOAD * float(rows.pressure[-1].mean())
     laws, part, found = curves(rows), 0.0, np.zeros(0)
-    halved = np.zeros((len(rows) - 1, 1 + 2 * len(patches)))
+    halved = np.zeros((len(rows) - 1, 1 + 2 * patches))
     while True:
         left_out = _left_out(curves, laws, rows, compliance, least)
         # of intervals, by their halving and by the rows on both sides
@@ -174,17 +187,18 @@ def refined(
         # micro models prefer rising approaches
         middle = 0.5 * (approaches[split] + approaches[split + 1])
         new = solve(middle)
-        guess = laws.at(patches, new.approach)
-        approaches = np.insert(approaches, split + 1, middle)
+        before, approaches = laws, np.insert(approaches, split + 1, middle)
         order = np.argsort(np.append(np.arange(len(rows)), split + 0.5))
         rows = rows.joined(new)[order]
         laws, place = curves(rows), split + 1 + np.arange(len(split))
-        stiffness = _stiffness(laws.at(patches, new.approach), compliance)
-        errors = errors_at(guess, stiffness, new, compliance, least)
-        wrong, before = _worst(errors), _worst(expected)[split]
+        touched = np.flatnonzero(rows.pressure.any(axis=0))  # most stay open
+        guess, point = (each.at(touched, new.approach[:, touched]) for each in (before, laws))
+        stiffness = _stiffness(point, _among(compliance, touched))
+        errors = errors_at(guess, stiffness, new, compliance, least, touched)
+        wrong, awaited = _worst(errors), _worst(expected)[split]
         # where laws are exact, as in full contact, an interval is halved for its gap alone
         exact = (wrong > 0.0).astype(float)
-        found = np.append(found, np.divide(wrong, before, out=exact, where=before > 0.0))
+        found = np.append(found, np.divide(wrong, awaited, out=exact, where=awaited > 0.0))
         halved = np.insert(halved, split + 1, errors, axis=0)
         halved[place - 1] = errors
     force, *each = (part * expected.max(axis=0)).tolist()
@@ -215,21 +229,19 @@ def _left_out(
         compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
         least: Least mean pressure that errors are relative to [MPa].
     """
-    count, patches = rows.pressure.shape
+    count = len(rows)
     inner, width = np.arange(1, count - 1), min(2 * _BESIDE + 1, count)
     first = np.clip(inner - _BESIDE, 0, count - width)
     window = first[:, None] + np.arange(width)
     window = window[window != inner[:, None]].reshape(len(inner), width - 1)
-    touched, own = np.flatnonzero(rows.pressure.any(axis=0)), rows[inner]  # most stay open
+    touched, own = np.flatnonzero(rows.pressure.any(axis=0)), rows[inner]
     without = curves(
         rows[:, touched].mapped(lambda each: np.moveaxis(each[window], 1, 0).reshape(width - 1, -1))
     )
-    point = laws.at(np.arange(patches), own.approach)
-    stiffness = _stiffness(point, compliance)
-    law = np.arange(len(inner) * len(touched)).reshape(-1, len(touched))
-    for field, part in zip(point, without.at(law, own.approach[:, touched]), strict=True):
-        field[:, touched] = part
-    errors = errors_at(point, stiffness, own, compliance, least)
+    approach, law = own.approach[:, touched], np.arange(len(inner) * len(touched))
+    stiffness = _stiffness(laws.at(touched, approach), _among(compliance, touched))
+    guess = without.at(law.reshape(-1, len(touched)), approach)
+    errors = errors_at(guess, stiffness, own, compliance, least, touched)
     return np.pad(errors, ((1, 1), (0, 0)))
 
 

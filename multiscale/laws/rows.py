@@ -159,17 +159,17 @@ class LawRows:
         """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
         return float(np.append(self.pressure[self.outside_range], np.inf)[0])
 
-    def untouched(self, law: int, touch: LawRows) -> Untouched:
+    def untouched(self, law: int, own: LawRows) -> Untouched:
         """Return what displaces the patch of one of N laws before it is touched.
 
         Args:
             law: Index of the law.
-            touch: The row of first touch; none of a patch that stays open.
+            own: Its rows from first touch on; none of a patch that stays open.
         """
         count = int(np.argmax(np.append(self.pressure[:, law] > 0.0, True)))
-        closures = np.append(self.closure[:count, law], touch.closure)
+        closures = np.append(self.closure[:count, law], own.closure[:1])
         displaced = self.unresolved_displacement[:count, law]
-        displaced = np.append(displaced, touch.unresolved_displacement)
+        displaced = np.append(displaced, own.unresolved_displacement[:1])
         # neighbours may take the surface away faster than the plane comes
         later = np.minimum.accumulate(closures[::-1])[::-1]
         kept = np.append(closures[:-1] < later[1:], True)

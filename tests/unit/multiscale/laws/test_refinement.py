@@ -103,7 +103,7 @@ def test_errors_are_what_the_half_space_makes_of_them():
     rows = Solver()(9e-3 * np.linspace(0.0, 1.0, 9))
     new = Solver()(np.array([3.3e-3, 5.6e-3]))
     guess = curves(rows).at(np.arange(2), new.approach)
-    errors = errors_at(guess, np.ones((2, 2)), new, COMPLIANCE, 0.0)
+    errors = errors_at(guess, np.ones((2, 2)), new, COMPLIANCE, 0.0, np.arange(2))
     wrong, true = found(laws(rows), new.approach[:, 0]), new.pressure
     # first order against Newton's method: errors of 1 % leave 1 % of them
     expected = np.abs(wrong.mean(axis=1)) / true.mean(axis=1)
