@@ -50,7 +50,7 @@ class Response(NamedTuple):
         xy: Shear strains ε_xy, half the change of the angle [mm²/MPa].
         growth: Derivative of ``normal`` with respect to the height of the block [mm²/MPa].
 
-    What is not asked for is NaN.
+    What is not asked for is NaN, of shape (1, 1, 1, 1).
     """
 
     normal: Array
@@ -106,9 +106,8 @@ class ParityBlock:
 
     def normal_response(self) -> Response:
         """Return the displacements downwards alone of the top by the modes of the parity."""
-        shape = 2 * self._counts(2)
-        normal = self._stiffness.works(self._modes(2)).reshape(shape)
-        return Response(normal, *[np.full(shape, np.nan)] * (len(Response._fields) - 1))
+        normal = self._stiffness.works(self._modes(2)).reshape(2 * self._counts(2))
+        return Response(normal, *(np.full(4 * (1,), np.nan) for _ in Response._fields[1:]))
 
     def traction_response(self) -> list[list[Array]]:
         """Return the displacements of the top by modes of traction along x and y.
