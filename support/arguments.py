@@ -253,6 +253,8 @@ def _taken(value: Any, hint: Any, finite: bool) -> Any:
     Raises:
         _Refused: When it is not what the annotation says.
     """
+    if value.__class__ is hint and (hint is not float or math.isfinite(value)):
+        return value
     if hint is ArrayLike:
         return real_array(value)
     hint = _meant(hint)
@@ -300,6 +302,7 @@ def _plural(inner: tuple[Any, ...]) -> str:
     return f"{simple[1]}s" if simple else f"values, each {words}" if words else "values"
 
 
+@cache
 def _options(inner: tuple[Any, ...]) -> list[Any]:
     """Return the annotations of a union, of which those of what numpy makes arrays of are one."""
     if not set(inner) >= _ARRAY_LIKE:
@@ -334,8 +337,9 @@ def _annotated(value: Any, hint: Any, finite: bool) -> Any:
 
 def _any_of(value: Any, hint: Any, finite: bool) -> Any:
     """Take a value of which one of several annotations holds."""
-    options = _options(get_args(hint))
-    problems = []
+    options, problems = _options(get_args(hint)), []
+    if value is None and type(None) in options:
+        return None
     for one in options:
         try:
             return _taken(value, one, finite)

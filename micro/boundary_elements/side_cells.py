@@ -107,23 +107,17 @@ class _SidePair:
 
     def loaded(self, fields: Array) -> Waves:
         """Return the waves of loads at the nodes by fields, (b, f, rows, cells); see `waves_of`."""
-        count, parts, rows, cells = fields.shape
-        lines = self.means.T @ fields.transpose(2, 0, 1, 3).reshape(rows, count * parts * cells)
-        return self.waves_of(lines, parts)
+        return self.waves_of(self.means.T @ fields)
 
-    def waves_of(self, lines: Array, parts: int = 1) -> Waves:
-        """Return waves of lines of loads at the nodes, shape (2 a, b f cells).
+    def waves_of(self, lines: Array) -> Waves:
+        """Return waves of lines of loads at the nodes, shape (waves, f a, 2 b).
 
         Args:
-            lines: The lines of b times f fields.
-            parts: Number f of fields that kernels take together.
-
-        Returns:
-            Shape (waves, f a, 2 b).
+            lines: The lines of b times f fields, of which kernels take f together, shape
+                (b, f, 2 a, cells).
         """
-        cells, last = len(self.place), self.place[-1] + 1
-        count = lines.shape[1] // (parts * cells)
-        by_cell = lines.reshape(2, -1, count, parts, cells).transpose(4, 3, 1, 2, 0)
+        (count, parts, _, cells), last = lines.shape, self.place[-1] + 1
+        by_cell = lines.reshape(count, parts, 2, -1, cells).transpose(4, 1, 3, 0, 2)
         placed = (np.empty if last == cells else np.zeros)((last, *by_cell.shape[1:]), lines.dtype)
         placed[self.place] = by_cell
         waves = fft.rfft(placed.reshape(last, -1), 2 * len(self.kernels) - 2, axis=0)
@@ -131,17 +125,15 @@ class _SidePair:
 
     def on_cells(self, waves: Waves, parts: int = 1) -> Array:
         """Return means over the cells by values' waves, (waves, f a, 2 b): (b, f, rows, cells)."""
-        means, count = self.means @ self.lines_of(waves, parts), waves.shape[2] // 2
-        by_field = means.reshape(len(means), count, parts, -1).transpose(1, 2, 0, 3)
-        return np.ascontiguousarray(by_field)
+        return np.asarray(self.means @ self.lines_of(waves, parts))
 
     def lines_of(self, waves: Waves, parts: int = 1) -> Array:
-        """Return lines of values at the nodes by waves, (waves, f a, 2 b): (2 a, b f cells)."""
+        """Return lines of values at the nodes by waves, (waves, f a, 2 b): (b, f, 2 a, cells)."""
         count = waves.shape[2] // 2
         by_wave = waves.reshape(len(self.kernels), -1)
         lines = fft.irfft(by_wave, 2 * len(self.kernels) - 2, axis=0)[self.place]
-        by_side = lines.reshape(len(self.place), parts, -1, count, 2).transpose(4, 2, 3, 1, 0)
-        return by_side.reshape(self.means.shape[1], -1)
+        by_side = lines.reshape(len(self.place), parts, -1, count, 2).transpose(3, 1, 4, 2, 0)
+        return by_side.reshape(count, parts, -1, len(self.place))
 
     def add_between(self, total: Array, row: Indices, cell: Indices) -> None:
         """Add the displacements of n cells by unit pressures on them, shape (n, n)."""
@@ -194,7 +186,7 @@ class _SidePair:
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
-        return self.lines_of(_multiplied(self.kernels, self.waves_of(lines)))
+        return self.lines_of(_multiplied(self.kernels, self.waves_of(lines[None, None])))[0, 0]
 
     def stresses(self, pressures: Array) -> Array:
         """Return stresses by b fields of pressures, shape (b, rows, cells).
