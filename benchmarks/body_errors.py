@@ -16,7 +16,8 @@ gap and stiffness of the interface are compared with quadratic elements on every
 eight. With `--friction` bodies are sheared in part besides, every other one by a shear force, and
 shear and energy lost to friction are compared, too. `--steep` takes 3 % of the slopes of the
 roughness. With `--every` all load steps of a path are compared, which leads back where nothing
-rubs, `--most` being the degrees of freedom of the finest elements.
+rubs, with `--back` under friction, too; `--most` are the degrees of freedom of the finest elements.
+With `--samples` the law is the mean of as many.
 """
 
 import os
@@ -184,6 +185,8 @@ def read_off(seed, folder, choice):
         data["surface"]["spectrum"] = spectrum | {"rms_slope": 0.03 * spectrum["rms_slope"]}
     data["body"] = {**data["body"], "element": ("linear", "quadratic")[body.order - 1]}
     data |= {"coupling": {"table_tolerance": 0.01}}
+    if choice.samples > 1:
+        data["law"] = {**data["law"], "seeds": [seed + 1000 * one for one in range(choice.samples)]}
     if rubs:
         data |= {"friction": {"coefficient": coefficient}}
 
@@ -192,7 +195,7 @@ def read_off(seed, folder, choice):
         sections["load"] = data["load"] | ({key: shear, "shear_steps": 2} if rubs else {})
         if choice.every:
             sections["load"]["steps"] = 3
-        if choice.every and not rubs:
+        if choice.every and (choice.back or not rubs):
             sections["load"]["pressure"] = (LOADS * body.pressure).tolist()
         sections["output"] = {**data["output"], "check": check}
         run, found = Run(Scene.from_dict(data | sections)), []
@@ -303,6 +306,8 @@ def main():
     parser.add_argument("--friction", action="store_true")
     parser.add_argument("--steep", action="store_true")
     parser.add_argument("--every", action="store_true")
+    parser.add_argument("--back", action="store_true")
+    parser.add_argument("--samples", type=int, default=1)
     parser.add_argument("--most", type=int, default=MOST_SHEARED)
     parser.add_argument("--shapes", nargs="+", choices=(*SHAPES, "block"), default=SHAPES)
     parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])

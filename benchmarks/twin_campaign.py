@@ -65,7 +65,7 @@ OF_TURNED_ERRORS = 5e-2
 OF_CONTACTS = 0.2
 """Of numbers of contacts there, of which one just touches: 4 and 5, of 6 at other load steps."""
 OF_PROPORTION = 0.2
-"""Of errors by elements, told once for forces within a factor of five: in finer load steps at
+"""Of errors by elements, told once for forces within a factor of 16: in finer load steps at
 another force."""
 OF_CELLS = 0.1
 """Of areas of laws: between rows they grow evenly, on cells by whole ones, of which 20 touch."""

@@ -134,7 +134,7 @@ class RepresentativeCoupling(Coupling):
             "new_laws": model.table.laws,
             "zero": self.parts.zero_error,
             "elsewhere": self._elsewhere,
-            "in_proportion": self.told,
+            "told": self.told,
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,

@@ -167,7 +167,10 @@ class LawShearProbe(LawErrorProbe):
 
     def answer_errors(self) -> dict[str, Array]:
         """Return the errors of the answer by elements, quadrature and load steps; collective."""
-        return super().answer_errors() | {"steps": self._by_steps()}
+        sizes = np.abs(self.answer)
+        sizes[4:6] = self.state.force
+        errors = self._while_pressed("steps", self._by_steps, sizes)
+        return super().answer_errors() | {"steps": errors}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
@@ -287,9 +290,10 @@ class LawShearProbe(LawErrorProbe):
             lost = self._shear.dissipated * share / (loaded.sum() * share.max())
             changes = []
             for stiffer in self._stiffer(share):
-                alike = self._interface_share
-                shear = np.abs(1.0 / (1.0 - alike + alike / stiffer) - 1.0) / alike * carried
-                error = shear if self.by_shift else np.abs(1.0 / stiffer - 1.0) * slip
+                error = np.abs(1.0 / stiffer - 1.0) * slip
+                if self.by_shift:
+                    alike = self._interface_share
+                    error = np.abs(1.0 / (1.0 - alike + alike / stiffer) - 1.0) / alike * carried
                 changes.append(self._by_interface(np.stack([error, lost * share.max()])))
             changed = np.maximum(*changes) / whole
         return {
@@ -367,20 +371,40 @@ class LawShearProbe(LawErrorProbe):
     @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
-        paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
-        if pressed := self._only_pressed(paths):
+        size = np.zeros((2, len(self.samples)))
+        for number, path in enumerate(self._paths):
+            if path:
+                size[:, number] = path[-1].size(by_shift=self.by_shift)
+        sizes = np.stack([np.ones_like(size[0]), *size, *size])
+        errors = self._while_pressed("friction", self._gone_on_cells, sizes)
+        return _OnCells(errors[0], errors[1:3], errors[3:], size)
+
+    def _while_pressed(self, of: str, measure: Callable[[], Array], sizes: Array) -> Array:
+        """Return errors, kept to further load steps while nothing shears; see `_once`."""
+        return self._once(of, measure, sizes) if self.pressed else measure()
+
+    def _gone_on_cells(self) -> Array:
+        """Return the errors of `_OnCells`, shape (5, R)."""
+        paths, pressed = self._paths, self.pressed
+        errors = np.zeros((5, len(self.samples)))
+        if pressed:
             paths = [path[-1:] for path in paths]
-        errors = np.zeros((7, len(self.samples)))
         tell = partial(self._of_sample, paths=paths, pressed=pressed)
         for number, own, areas in self.of_regions("check of friction", tell, paths):
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
-        return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
+        return errors
 
-    def _only_pressed(self, paths: Sequence[Sequence[_Reached]]) -> bool:
-        """Tell whether what the face shears by is that of the pressing alone."""
+    @cached_property
+    def _paths(self) -> list[list[_Reached]]:
+        """What the laws reach along the path, by region; collective."""
+        return [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+
+    @cached_property
+    def pressed(self) -> bool:
+        """Whether what the face shears by is that of the pressing alone; collective."""
         if math.hypot(*self._shear.force) > _NO_SHEAR * self.state.force:
             return False
-        ends = zip(self.samples, paths, strict=True)
+        ends = zip(self.samples, self._paths, strict=True)
         return all(
             math.hypot(*reached.rate) <= _STICKS * region.coefficient
             for region, path in ends
@@ -500,9 +524,17 @@ class _Reached(NamedTuple):
     rate: Array
     lost: float
 
+    def size(self, *, by_shift: bool) -> tuple[float, float]:
+        """Return what `_OnCells` has errors of.
+
+        Args:
+            by_shift: Whether the shift is prescribed.
+        """
+        return math.hypot(*(self.rate if by_shift else self.slip)), self.lost / self.pressure
+
 
 def _errors_of(law: _Reached, ends: Array, areas: Array, *, by_shift: bool) -> list[float]:
-    """Return what `_OnCells` has of one region.
+    """Return the errors of `_OnCells` of one region.
 
     Args:
         law: What its law reaches.
@@ -521,8 +553,7 @@ def _errors_of(law: _Reached, ends: Array, areas: Array, *, by_shift: bool) -> l
     apart[:, 2] = np.nan_to_num(apart[:, 2])
     nearer = float(weights @ ends[:, 0, 1])
     pressure = forces.sum() / areas.sum() - law.stiffness * nearer
-    size = math.hypot(*by_law), law.lost / law.pressure
-    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid_error(*apart.T[1:]), *size
+    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid_error(*apart.T[1:])
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 

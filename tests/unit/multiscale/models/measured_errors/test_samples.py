@@ -22,7 +22,11 @@ from patchlaw.multiscale.models.measured_errors.faces import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.models.measured_errors.samples import (
+    SampleProbe,
+    interpolation_errors,
+    mean_error,
+)
 from patchlaw.support import InputError, NotConverged
 from patchlaw.support.readable import quantity
 
@@ -350,6 +354,18 @@ def test_other_elements_are_kept_between_load_steps_and_tell_the_same(mesh, monk
     for one, other in zip(kept, fresh, strict=True):
         abs_ = 1e-7 * one.force_N  # load steps converge to 1e-9
         assert dict(one.errors) == pytest.approx(dict(other.errors), rel=1e-4, abs=abs_)
+
+
+def test_errors_are_recalled_of_the_nearest_load_and_only_where_they_are_known():
+    probe = SimpleNamespace(told=[])
+    for of, load, error in (("cells", 1.0, 3.0), ("cells", 3.0, 2.0), ("steps", 2.0, 9.0)):
+        SampleProbe.tell_later(probe, of, load, np.array([error]))
+    SampleProbe.tell_later(probe, "cells", 2.0, np.array([math.inf]))
+    found = [
+        SampleProbe.recalled(probe, "cells", one, 4.0, 1.5) for one in (0.6, 1.0, 1.9, 2.1, 13)
+    ]
+    assert found == [None, 3.0, 3.0, 2.0, None]
+    assert SampleProbe.recalled(probe, "cells", 2.9, 2.0, 1.0) is None  # from lower loads alone
 
 
 def test_other_elements_whose_contact_fails_are_not_used_again():
