@@ -508,9 +508,9 @@ class FiniteSlopes:
         second = abs(self._second(stresses, curvatures)[0])
         along, across = directed
         near = np.sqrt(along**2 + (loaded - along) ** 2 + 2.0 * across**2)
-        around = np.pad(below, 1, mode="wrap") if self._periodic else below
+        around = below if self.edge_stresses else np.pad(below, 1, mode="wrap")
         squares = sum(np.square(part) for part in np.gradient(around, *self.spacing))
-        if self._periodic:
+        if not self.edge_stresses:
             squares = squares[1:-1, 1:-1]
         steepness = float(np.sum(near * squares)) / (float(np.sum(near)) or 1.0)
         third = (0.3 + 12.0 * nu**2) * steepness
