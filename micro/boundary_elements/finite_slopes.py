@@ -17,18 +17,23 @@ grows by the forms
 u(t) = (1/Gk) (t − ν k (k · t)/k²) the displacement by tangential tractions (Cerruti). The first is
 also what Eshelby's energy-momentum tensor gives. Both are symmetric, and on a half-space they do
 not change when h does by a constant. A finite body changes with its height: the first order takes
-heights from the plane of the flat body. The second, which takes its tractions as on a half-space,
-takes them from the top, where they are smallest under the loads.
+heights from the plane of the flat body.
 
 Beside the sides of a body, displacements by tangential tractions and curvatures are not those of a
 half-space. The second order of constant heights was then not 0 there: of loads that change from
 cell to cell along a side it was −1.4 of their displacement with heights of two cells, where no
-iteration converges. So heights count from those of the loads there. With stresses τ and curvatures
-λ by pressures h p it is, for p' = p,
+iteration converges. With the strains E τ by tractions ∂_α τ_αβ, which is a symmetric operator with
+κ = E σ on the half-space, it is for p' = p
 
-    ∫ (h² σ : κ − 2 h σ : λ + τ : λ + t · u(t)) dA,    t_β = ∂_α (h σ_αβ − τ_αβ),
+    ∫ (h² σ : E σ − h σ : E(h σ)) dA = ½ ∬ (h − h')² σ : E σ' dA dA',
 
-which is 0 for constant heights, and the form above on a half-space.
+which counts nothing but differences of heights, whatever the stresses are.
+
+Stresses end at the sides, and so have waves of all lengths. A kernel of E that ends sharply at the
+shortest wave of cells falls off as slowly as 1/r, alternating from cell to cell. Times the squares
+of differences of heights it made the second order of loads on the outermost cells grow with the
+number of cells, and corners far below the plane gave way. Beyond the waves that pressures have, E
+therefore falls to 0 smoothly.
 
 The first order does not change by constant heights either, where stresses are exact. At the corners
 of a body those at the centres of cells miss 16 % of it under loads on single cells: times a depth
@@ -93,7 +98,8 @@ class Waves:
         shown: Coarse cells (sx, sy) that fields have: those of the torus, or of the rectangle with
             nothing around it.
         wave_number: |k| of the waves, each for its real and its imaginary part: a product of reals
-            is quicker than one with complex numbers. Shape (mx, 2 (my // 2 + 1)) [1/mm].
+            is quicker than one with complex numbers. Shape (mx, 2 (my // 2 + 1)) [1/mm]. With
+            nothing around the rectangle it falls to 0 beyond the waves that pressures have.
         directions: k_x²/|k|², k_y²/|k|² and k_x k_y/|k|² likewise, shape (3, mx, 2 (my // 2 + 1));
             their means over all directions where k = 0.
     """
@@ -322,8 +328,8 @@ class FiniteSlopes:
     Moving all heights by a constant changes nothing under loads much shorter than the body.
     Stresses at the centres of cells beside a free side keep to this only where loads vary little
     from cell to cell: otherwise what is left of the form, times a height much larger than a cell,
-    exceeds the compliance of the cells itself. Beside free sides heights therefore count from those
-    of the loads, in the first order where they are deep against the cells.
+    exceeds the compliance of the cells itself. Beside free sides heights of quick loads therefore
+    count from their own in the first order, where they are deep against the cells.
 
     Args:
         surface: The surface.
