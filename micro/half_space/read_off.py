@@ -52,7 +52,7 @@ _RAISED_PEAK, _RAISED_FORCE = 0.5, 0.02
 """Pressure of cells that finite slopes raise by more than the plane presses them, over the largest,
 and their share of the force, above which these pressures are taken for wrong. With a second order
 that grew with the number of cells, 7 of 35 blocks exceeded one of them, pressed to 35 to 95 % of
-their range of heights, others had at most 0.32 and 0.016. Of 46 such blocks now none does."""
+their range of heights, others had at most 0.32 and 0.016. Of 57 drawn blocks now one does."""
 
 
 class CellLoad(NamedTuple):
