@@ -14,7 +14,6 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
 import time
-from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -28,7 +27,7 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from patchlaw.multiscale import Scene, extrapolated, make_setup
+from patchlaw.multiscale import CellContact, ElasticBlock, extrapolated
 
 GRID, SIDE, RADIUS, FLOOR = 256, 1.0, 0.16, -0.05
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -66,33 +65,13 @@ def meshed(surface, scale, approaches, edges):
 
 def models(surface):
     """Return the contact problem of a surface with finite slopes and without."""
-    scene = Scene.from_dict(
-        {
-            "surface": {
-                "spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215},
-                "grid": list(surface.grid),
-                "lengths": list(surface.lengths),
-            },
-            "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
-            "micro": {"model": "half-space"},
-            "coupling": {"kind": "concurrent"},
-            "load": {"approach": 8e-3},
-        }
-    )
-    setup = make_setup(scene)
-    micro = replace(setup.parts.micro, surface=surface)
-    parts = replace(setup.parts, surface=surface, micro=micro)
-    small = replace(parts, finite_slopes=False)
-    return tuple(replace(setup, parts=one).model_on_body() for one in (parts, small))
+    block = ElasticBlock(MATERIAL, height=SIDE)
+    return tuple(CellContact.of(surface, block, finite_slopes=slopes) for slopes in (True, False))
 
 
 def curve(model, scale, approaches):
-    forces, guess = [], None
-    for approach in approaches:
-        state = model.press(Control(approach=scale * approach), start=guess)
-        guess = state.guess
-        forces.append(state.force / scale)
-    return np.array(forces)
+    steps = [model.press(Control(approach=scale * approach)) for approach in approaches]
+    return np.array([step.force_N for step in steps]) / scale
 
 
 def main():

@@ -7,10 +7,9 @@ import pytest
 import scipy
 from helpers.meshed_slopes import forces_with_slopes_and_without
 
-from patchlaw.geometry import Control, Material
+from patchlaw.geometry import Control, Material, Surface
 from patchlaw.micro import FiniteSlopes
-from patchlaw.multiscale import Run, Scene, make_setup
-from patchlaw.support.readable import Caution
+from patchlaw.multiscale import CellContact, ElasticBlock, Scene, make_setup
 
 
 class Counted(FiniteSlopes):
@@ -166,27 +165,22 @@ def test_loads_in_deep_corners_of_a_block_displace_it():
 
 
 @pytest.mark.long
-def test_pressures_that_finite_slopes_alone_make_are_told():
-    """Of a wavy ramp that is pressed until low corners touch, these bore eight Young's moduli."""
-    x = (np.arange(24) + 0.5) / 24
-    waves = np.multiply.outer(np.cos(2.8 * np.pi * x), np.cos(2.4 * np.pi * x))
-    heights = 0.45 * x[:, None] + 0.1 * waves
-    scene = Scene.from_dict(
-        {
-            "surface": {"heights": heights, "lengths": [1.0, 1.0]},
-            "block": MATERIAL | {"height": 0.6},
-            "micro": {"model": "half-space"},
-            "coupling": {"kind": "concurrent"},
-            "load": {"approach": 0.75 * float(np.ptp(heights)), "steps": 2},
-            "output": {"figures": False, "report": False, "check": "none"},
-        }
-    )
-    run = Run(scene)
-    some, all_corners = run.load_steps()
-    assert some.warnings == () and some.peak_pressure_MPa < 4000.0
-    assert all_corners.peak_pressure_MPa > 4000.0
-    (told,) = (note for note in run.history().notes if "finite slopes raise" in note)
-    assert isinstance(told, Caution)
-    assert "1 of 2; first step 2: finite slopes raise" in told
-    assert "micro.finite_slopes = false" in told
-    run.close()
+def test_pressures_in_low_corners_do_not_grow_as_cells_shrink():
+    """Of a wavy ramp, pressed until low corners touch, these bore one and fifteen Young's moduli.
+
+    The block that is as rough bears 87.72, 182.5 and 456.4 N, by two meshes.
+    """
+    block, peaks = ElasticBlock(Material(**MATERIAL), height=1.5), []
+    for cells in (24, 48):
+        x = (np.arange(cells) + 0.5) / cells
+        waves = np.multiply.outer(np.cos(2.8 * np.pi * x), np.cos(2.4 * np.pi * x))
+        surface = Surface(heights=0.45 * x[:, None] + 0.1 * waves, lengths=(1.0, 1.0))
+        contact, steps = CellContact.of(surface, block), []
+        for share in (0.35, 0.5, 0.75):
+            steps.append(contact.press(Control(approach=share * 0.6232)))
+        assert all(step.warnings == () for step in steps)
+        peaks.append(steps[-1].peak_pressure_MPa)
+        meshed = pytest.approx([87.72, 182.5, 456.4], rel=0.1 if cells == 24 else 0.02)
+        assert [step.force_N for step in steps] == meshed
+    assert peaks[1] == pytest.approx(peaks[0], rel=0.1)
+    assert peaks[1] < MATERIAL["young_modulus"]
