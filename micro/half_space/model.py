@@ -264,13 +264,15 @@ class HalfSpaceModel:
         depth, worn = (None, None) if before is None else (before.plastic_depth, before.worn_depth)
         (pressure, yielding), displacement, gap, left = self._borne(solved), None, None, None
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
-        if by_slopes is not None and (by_slopes < 0.0).any():
+        lifted = by_slopes is not None and bool((by_slopes < 0.0).any())
+        if lifted or means is None:
             below = self.interference(plane, load.lowered)
+        if by_slopes is not None and lifted:
             warning = raised_by_slopes(pressure, yielding, by_slopes, below)
         if means is None:
-            worn = sum_of(worn, self._worn_off(pressure))
-            interference = self.interference(plane, sum_of(depth, worn))
-            displacement, gap = self._fields(solved, pressure, interference, displaced)
+            if (off := self._worn_off(pressure)) is not None:
+                worn, below = sum_of(worn, off), below - off
+            displacement, gap = self._fields(solved, pressure, below, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
         if self.hardness is not None:
