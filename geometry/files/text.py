@@ -35,6 +35,8 @@ _MISSING = re.compile(
     _CELL.format(rf"no_?data|bad|n/?a|-{{2,3}}|\*{{2,3}}|{_FAULT}"), re.IGNORECASE | re.ASCII
 )
 """Other words for it, which headings may contain."""
+_PLAIN = re.compile(r"(?!.*--)[-+.,;eE\d\s]*")
+"""Lines with none of these, as most are."""
 _LATERAL_UNIT = re.compile(r"#\s*Lateral units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
@@ -126,16 +128,20 @@ def load_text(file: Path) -> Text | None:
         whole = content.decode("latin-1")
     lines = whole.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comments = [line.strip() for line in lines if line.lstrip().startswith("#")]
-    numbered = (
-        (number, _NO_NUMBER.sub("nan", _COMMENT.sub("", line)).strip(" \v\f"))
-        for number, line in enumerate(lines, 1)
+    cleaned = (
+        line if _PLAIN.fullmatch(line) else _NO_NUMBER.sub("nan", _COMMENT.sub("", line))
+        for line in lines
     )
+    numbered = ((number, line.strip(" \v\f")) for number, line in enumerate(cleaned, 1))
     rows = [(number, row) for number, row in numbered if row.strip()]
     count = _heading(rows)
     return Text(
         comments=comments,
         heading=[row.strip() for _, row in rows[:count]],
-        rows=[(number, _MISSING.sub("nan", row)) for number, row in rows[count:]],
+        rows=[
+            (number, row if _PLAIN.fullmatch(row) else _MISSING.sub("nan", row))
+            for number, row in rows[count:]
+        ],
     )
 
 
