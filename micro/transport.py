@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.micro.gap_cells import (
-    WidestPaths,
+    WidestPath,
     cell_links,
     cell_network,
     joined_pools,
@@ -85,7 +85,6 @@ class GapFlow:
         pressure: Fluid pressure, 1 at the first side and 0 at the other, NaN in contact and where
             no path from a side leads, shape (nx, ny). On large maps in pools off the way of the
             flow, which it hardly changes, it may err by some hundredths.
-        paths: Widest paths through the same map.
     """
 
     gap: Array
@@ -94,7 +93,6 @@ class GapFlow:
     periodic: bool
     total: float
     pressure: Array
-    paths: WidestPaths
 
     @property
     def percolates(self) -> bool:
@@ -159,22 +157,20 @@ class GapFlow:
         """
         if not self.percolates:
             return None
-        ends, shape = self.paths.narrowest[self.axis], self.gap.shape
-        pressure, gap = (
-            np.append(one, both)
-            for one, both in ((self.pressure, (1, 0)), (self.gap, 2 * [np.inf]))
-        )
+        path = WidestPath(self.gap, self.lengths, self.axis, periodic=self.periodic)
+        narrowest, shape = path.narrowest(), self.gap.shape
+        assert narrowest is not None, "fluid flows along some path"
+        ends, _ = narrowest
+        pressure, gap = np.append(self.pressure, (1.0, 0.0)), np.append(self.gap, (np.inf, np.inf))
         cell = int(min(ends, key=gap.item))
         above = pressure > pressure[ends].mean()
         cells = above[:-2].reshape(shape)
-        (tail, head), link = self.paths.links(
-            self.axis, [cells[:-1] != cells[1:], cells[:, :-1] != cells[:, 1:]]
-        )
+        (tail, head), link = path.links([cells[:-1] != cells[1:], cells[:, :-1] != cells[:, 1:]])
         flow = np.nan_to_num(np.abs(link * (pressure[tail] - pressure[head])))
         flow[above[tail] == above[head]] = 0.0
         beside = np.zeros(len(above), bool)  # all cells of a side are joined by its terminal
         beside[tail[flow > 0.0]] = beside[head[flow > 0.0]] = True
-        pools, count = self.paths.pools(beside[:-2].reshape(shape))
+        pools, count = path.pools(beside[:-2].reshape(shape))
         if self.periodic:
             over = joined_pools(pools[:-2].reshape(shape), count, 1 - self.axis)
             pools = over[pools]
@@ -243,8 +239,6 @@ def gap_flows(
         found = cell_flows(open_gap, lengths, axes, periodic=periodic, tolerance=tolerance)
     if found is None:
         found = [_factorised_flow(open_gap, lengths, axis, periodic) for axis in axes]
-    ways = [axis for axis, (_, total) in zip(axes, found, strict=True) if total > 0.0]
-    paths = WidestPaths(open_gap, lengths, ways, periodic=periodic)
     return [
         GapFlow(
             gap=open_gap,
@@ -253,7 +247,6 @@ def gap_flows(
             periodic=periodic,
             total=total,
             pressure=pressure,
-            paths=paths,
         )
         for axis, (pressure, total) in zip(axes, found, strict=True)
     ]
