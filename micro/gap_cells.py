@@ -145,11 +145,13 @@ class WidestPath:
         None where no path leads from side to side.
         """
         low, high, factor = 0.0, np.inf, _NEAR
+        if not self._gap.any():
+            return None
         if self._gap.size > _FEW:
             coarse = self._gap[::2, ::2]
             found = WidestPath(coarse, self._lengths, self._axis, periodic=self._periodic)
             known = found.narrowest()
-            guess = known[1] if known else float(np.median(coarse[coarse > 0.0])) ** 3
+            guess = known[1] if known else float(np.median(self._gap[self._gap > 0.0])) ** 3
             low, high = guess / factor, guess * factor
         while True:
             ends, conductance, terminals, tail, head = self._between(low, high)
