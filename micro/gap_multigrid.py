@@ -160,7 +160,7 @@ class _Grid:
         links: Those of cells of each parity to all neighbours, as `padded` ones, with anything in
             the lines at their sides.
         diagonal: Sums of all links of cells of each parity, `padded`.
-        inverse: Their inverses, 0 in closed cells.
+        inverse: Their inverses, 0 in closed cells; kept where it does not relax them.
         right: Where to put a right side for the cycle.
         change: Where a coarser grid reads its right side, and puts what it finds.
     """
@@ -198,7 +198,7 @@ class _Grid:
         }
         self.weights.clear()
         relaxed = PARITIES[-2:] if among == 2 else PARITIES
-        self._inverse = {one: self.inverse[one].astype(np.float32) for one in relaxed}
+        self._inverse = {one: self.inverse.pop(one).astype(np.float32) for one in relaxed}
         self.right: Parts = {one: np.zeros(rows, np.float32) for one in relaxed}
         self._from_others = {
             one: [(_halves(one[0] + i, one[1] + j)[0], link, (i, j)) for (i, j), link in seen]
@@ -207,8 +207,8 @@ class _Grid:
         self.found = Cells(self.shape, np.float32)
         self._total, self._work = (np.empty(rows, np.float32) for _ in range(2))
         if entirely:
-            for values in (self.links, self.diagonal, self.inverse):
-                values.clear()
+            self.links.clear()
+            self.diagonal.clear()
         self._links.clear()
 
     def _both_ways(self, *, single: bool = False) -> dict[Offset, Parts]:

@@ -81,7 +81,7 @@ def _grown(head: Numbers, link: Array, terminals: Array, sums: Array) -> tuple[N
     cells = np.arange(len(sums))
     to = np.where(sums > 0.0, head[link.argmax(axis=0), cells], int(sums.argmin()))
     found: Numbers = joined(cells, to, len(sums))  # closed cells with each other
-    own, sides = found, np.nonzero(link)
+    own, sides = found, np.nonzero((found[head] != found) & (link != 0.0))
     tail: Numbers = sides[1]
     head, link = head[sides], link[sides]
     while True:

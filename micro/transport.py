@@ -25,6 +25,7 @@ Source:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,9 +34,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.micro.gap_cells import cell_links, cell_network, joined_pools, link_ends, turned
-from patchlaw.support import Array, Flags, Indices, InputError
-from patchlaw.support.network import Numbers, banded, narrowest_link, network_flow
+from patchlaw.micro.gap_cells import (
+    WidestPath,
+    cell_links,
+    cell_network,
+    joined_pools,
+    link_ends,
+    turned,
+)
+from patchlaw.support import Array, InputError
+from patchlaw.support.network import banded, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
@@ -47,10 +55,6 @@ _MOST_FACTORISED, _THIN = 72**2, 8
 took 20, 34 and 51 ms of CPU so on 64², 80² and 96² cells, at 2 % contact, and 21, 30 and 32 ms by
 multigrid. And how many times as many along the other side: those of thin maps, halved as often as
 their long side, would be filled up to many times their number."""
-
-
-_LEVELS = 32
-"""Cells whose gaps are tried for that of the narrowest place; others lie between two of them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,8 +134,14 @@ class GapFlow:
 
         1 is that between parallel plates at the mean gap.
         """
-        turned = _Turned(self)
-        (along, across), (length, width) = turned.flows, turned.sides
+        gap, (length, width) = turned(self.gap, self.lengths, self.axis)
+        pressure = np.pad(turned(self.pressure, self.lengths, self.axis)[0], ((1, 1), (0, 0)))
+        pressure[0] = 1.0
+        links = cell_links(gap**3, (length, width), periodic=self.periodic)
+        along, across = (  # 0 in pools that no path from a side leads to
+            np.nan_to_num(link * (tail - head), copy=False)
+            for link, (tail, head) in zip(links, link_ends(pressure), strict=True)
+        )
         plates = float(self.gap.mean()) ** 3 / length
         # each cell has the mean of what passes through two opposite faces
         first = 0.5 * (along[:-1] + along[1:]) / (width / across.shape[1] * plates)
@@ -147,29 +157,31 @@ class GapFlow:
         """
         if not self.percolates:
             return None
-        turned = _Turned(self)
-        ends = turned.narrowest()
-        cell = min(ends, key=turned.cubes.item)
-        above = turned.pressure > turned.pressure.flat[ends].mean()
-        along, across = turned.flows
-        along[above[:-1] == above[1:]] = 0.0
-        across[above[1:-1] == np.roll(above[1:-1], -1, axis=1)] = 0.0
-        beside = (along[:-1] != 0.0) | (along[1:] != 0.0)
-        beside |= (across != 0.0) | (np.roll(across, 1, axis=1) != 0.0)
-        channel = np.zeros(above.shape, bool)  # all cells of a side are joined by its terminal
-        pools = turned.pools(beside)
-        channel[1:-1] = beside & (pools == pools.flat[cell - above.shape[1]])
-        share = sum(
-            np.abs(flow[tail | head]).sum()
-            for flow, (tail, head) in zip((along, across), link_ends(channel), strict=True)
-        )
-        x, y = np.divmod(cell, above.shape[1])
-        length, width = turned.sides
-        place = float((x - 0.5) * length / len(across)), float((y + 0.5) * width / above.shape[1])
+        path = WidestPath(self.gap, self.lengths, self.axis, periodic=self.periodic)
+        narrowest, shape = path.narrowest(), self.gap.shape
+        assert narrowest is not None, "fluid flows along some path"
+        ends, _ = narrowest
+        pressure, gap = np.append(self.pressure, (1.0, 0.0)), np.append(self.gap, (np.inf, np.inf))
+        cell = int(min(ends, key=gap.item))
+        above = pressure > pressure[ends].mean()
+        cells = above[:-2].reshape(shape)
+        (tail, head), link = path.links([cells[:-1] != cells[1:], cells[:, :-1] != cells[:, 1:]])
+        flow = np.nan_to_num(np.abs(link * (pressure[tail] - pressure[head])))
+        flow[above[tail] == above[head]] = 0.0
+        beside = np.zeros(len(above), bool)  # all cells of a side are joined by its terminal
+        beside[tail[flow > 0.0]] = beside[head[flow > 0.0]] = True
+        pools, count = path.pools(beside[:-2].reshape(shape))
+        if self.periodic:
+            over = joined_pools(pools[:-2].reshape(shape), count, 1 - self.axis)
+            pools = over[pools]
+        channel = beside & (pools == pools[cell])
+        channel[-2:] = False
+        share = math.fsum(flow[channel[tail] | channel[head]])  # the same in any order
+        place = np.add(np.divmod(cell, shape[1]), 0.5) * self.lengths / shape
         return Constriction(
-            place=place[::-1] if self.axis else place,
-            gap=float(turned.gap.flat[cell - above.shape[1]]),
-            share=min(float(share) / self.total, 1.0),
+            place=(float(place[0]), float(place[1])),
+            gap=float(gap[cell]),
+            share=min(share / self.total, 1.0),
         )
 
 
@@ -258,73 +270,6 @@ def open_gaps(gap: Array, largest: float) -> Array:
         largest: The largest gap of the surface that they belong to [mm].
     """
     return np.where(gap > _LEAST_GAP * largest, gap, 0.0)
-
-
-class _Turned:
-    """A flow along x through a map whose sides are terminals: lines of infinitely wide cells.
-
-    Args:
-        flow: The flow, whose axes are swapped if it leads along y.
-
-    Attributes:
-        gap: Gaps, shape (nx, ny) [mm].
-        sides: Sides of the map [mm].
-        cubes: Their g³ with the terminals, shape (nx + 2, ny) [mm³].
-        pressure: Fluid pressures, likewise.
-        links: See `cell_links`.
-    """
-
-    def __init__(self, flow: GapFlow) -> None:
-        self.gap, self.sides = turned(flow.gap, flow.lengths, flow.axis)
-        nx, ny = self.gap.shape
-        self.cubes, self.pressure = np.full((nx + 2, ny), np.inf), np.ones((nx + 2, ny))
-        self.cubes[1:-1] = self.gap * self.gap * self.gap
-        self.pressure[1:-1], _ = turned(flow.pressure, flow.lengths, flow.axis)
-        self.pressure[-1] = 0.0
-        self._periodic = flow.periodic
-        self.links = cell_links(self.cubes[1:-1], self.sides, periodic=flow.periodic)
-
-    @property
-    def flows(self) -> list[Array]:
-        """Flows through the links, 0 in pools that no path from a side leads to."""
-        ends = zip(self.links, link_ends(self.pressure), strict=True)
-        return [np.nan_to_num(link * (tail - head), copy=False) for link, (tail, head) in ends]
-
-    def pools(self, some: Flags) -> Numbers:
-        """Return the number of the pool that each of some cells is in, 0 of others, (nx, ny)."""
-        from scipy import ndimage
-
-        pools, count = ndimage.label(some)
-        return joined_pools(pools, count, 1)[pools] if self._periodic else pools
-
-    def narrowest(self) -> Indices:
-        """Return the cells at both ends of the narrowest link of the widest path, (2,).
-
-        A link has one to two times the narrower of its cells, times its width over its length.
-        Cells that are joined by wider links than the narrowest one are taken together.
-        """
-        known = np.unique(self.cubes[1:-1].flat[:: max(1, self.gap.size // _LEVELS)])
-        known, low, high = known[known > 0.0], -1, int((known > 0.0).sum())
-        while high - low > 1:
-            level = (low + high) // 2
-            pools = self.pools(self.cubes >= known[level])
-            low, high = (level, high) if pools[0, 0] == pools[-1, 0] else (low, level)
-        (nx, ny), (length, width) = self.gap.shape, self.sides
-        narrow, broad = sorted((length * ny / (width * nx), width * nx / (length * ny)))
-        least = 0.99 * narrow * known[low] if low >= 0 else np.finfo(float).tiny
-        most = 2.01 * broad / narrow * known[high] if high < len(known) else np.inf
-        wide = self.cubes >= most
-        node = self.pools(wide)
-        node[~wide] = node.max() + 1 + np.arange(wide.size - wide.sum())
-        cells, parts = np.arange(wide.size, dtype=np.intc).reshape(wide.shape), []
-        for link, places, (tail, head) in zip(
-            self.links, link_ends(cells), link_ends(node), strict=True
-        ):
-            some = (tail != head) & (link >= least)
-            parts.append([one[some] for one in (*places, tail, head, link)])
-        first, second, tail, head, link = map(np.concatenate, zip(*parts, strict=True))
-        narrowest = narrowest_link(tail, head, link, (node[0, 0], node[-1, 0]))
-        return np.array([first[narrowest], second[narrowest]])
 
 
 def widened_gap(gap: Array, *, periodic: bool) -> Array:

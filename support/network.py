@@ -196,18 +196,21 @@ def joined(tail: Numbers, head: Numbers, count: int) -> Numbers:
     return found
 
 
-def narrowest_link(tail: Numbers, head: Numbers, conductance: Array, ends: tuple[int, int]) -> int:
+def narrowest_link(
+    tail: Numbers, head: Numbers, conductance: Array, ends: tuple[int, int]
+) -> int | None:
     """Return the number of the narrowest link on the widest path between two nodes.
 
-    Its conductance is the largest that the narrowest link of a path has. Many links are halved:
-    where the wider half joins both nodes, the others are left out; where not, the nodes that it
-    joins are merged. The path lies in the maximum spanning tree of the links that are left.
+    None where no path joins them. Its conductance is the largest that the narrowest link of a path
+    has. Many links are halved: where the wider half joins both nodes, the others are left out;
+    where not, the nodes that it joins are merged. The path lies in the maximum spanning tree of the
+    links that are left.
 
     Args:
         tail: Node where each of m links begins, shape (m,).
         head: Node where it ends, shape (m,).
         conductance: Conductance of each link, shape (m,).
-        ends: Both nodes, which links join.
+        ends: Both nodes.
 
     Source:
         Camerini 1978, doi 10.1016/0020-0190(78)90030-3 (halves).
@@ -224,8 +227,10 @@ def narrowest_link(tail: Numbers, head: Numbers, conductance: Array, ends: tuple
             ends, tail, head = (node[ends[0]], node[ends[1]]), node[tail], node[head]
             apart = tail != head
             number, tail, head = number[apart], tail[apart], head[apart]
-    size = int(max(tail.max(), head.max())) + 1
+    size = int(max(tail.max(initial=0), head.max(initial=0), *ends)) + 1
     before, link = _widest_paths(tail, head, conductance[number], ends[0], size)
+    if before[ends[1]] < 0:
+        return None
     path = [ends[1]]
     while path[-1] != ends[0]:
         path.append(int(before[path[-1]]))

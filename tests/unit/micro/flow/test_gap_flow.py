@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from patchlaw.micro import gap_iteration, transport
-from patchlaw.micro.gap_cells import cell_network
+from patchlaw.micro.gap_cells import WidestPath, cell_network
 from patchlaw.micro.transport import gap_flow, gap_flows, widened_gap
 from patchlaw.support import InputError
 from patchlaw.support.network import narrowest_link
@@ -96,6 +96,33 @@ def test_the_narrowest_place_is_that_of_the_network_of_all_cells(lengths, period
     pressure = np.append(flow.pressure, (1.0, 0.0))
     least = abs(net.conductance[link] * (pressure[net.tail[link]] - pressure[net.head[link]]))
     assert least / flow.total <= flow.constriction.share * (1 + 1e-12) <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("case", ["cell by cell", "smooth", "alike", "between every second cell"])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_narrowest_link_of_a_large_map_is_that_of_a_search_in_all_its_links(axis, case):
+    """Whether that on every second cell is near it, far from it, or not there."""
+    gap = rough(shape=(90, 110), closed=0.2)
+    lengths = (1.0, 3.0) if case == "alike" else (0.9, 1.1)
+    if case == "smooth":
+        heights = ndimage.gaussian_filter(np.log(gap + 1e-3), 3.0, mode="wrap")
+        gap = np.maximum(heights - np.quantile(heights, 0.3), 0.0)
+    elif case == "alike":
+        gap = np.where(gap > 0.0, 1e-3, 0.0)
+    elif case == "between every second cell":
+        gap[::2] = gap[:, ::2] = 0.0
+        gap[31], gap[:, 47] = 1e-5 + 1e-6 * np.arange(110) ** 0.5, 2e-5
+    net = cell_network(gap**3 if axis == 0 else gap.T**3, lengths[:: 1 - 2 * axis], periodic=True)
+    link = narrowest_link(net.tail, net.head, net.conductance, (net.inlet, net.outlet))
+    (tail, head), found = WidestPath(gap, lengths, axis, periodic=True).narrowest()
+    assert found == pytest.approx(net.conductance[link], rel=1e-14)
+    if case != "alike":
+        inner = [one for one in (net.tail[link], net.head[link]) if one < net.count]
+        cells = [one if axis == 0 else one % 90 * 110 + one // 90 for one in inner]
+        assert sorted({tail, head} - {net.inlet, net.outlet}) == sorted(cells)
+    gap[40], gap[:, 60] = 0.0, 0.0
+    assert WidestPath(gap, lengths, axis, periodic=True).narrowest() is None
+    assert WidestPath(0.0 * gap, lengths, axis, periodic=True).narrowest() is None
 
 
 def test_a_closed_line_lets_nothing_through():
