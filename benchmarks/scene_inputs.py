@@ -285,7 +285,7 @@ def planned(path, overrides=()):
         of_heights = str(error.key).endswith("surface.file")  # which names the file of heights
         assert str(path) in told or of_heights or (overrides and error.key is None), told
         assert error.key or re.search(
-            "is not (valid TOML|UTF-8)|cannot be read|no such file|override", told
+            "is not (valid TOML|UTF-8)|cannot be read|no such file|override|nested too deeply", told
         )
         assert len(told) < 2000, told[:300]
         return "refused"

@@ -81,7 +81,8 @@ class ActiveSet:
         pressure: Present pressures, which are admissible, shape (nx, ny).
         motion: Free motions of the body that close the gaps best, shape (k,) [mm].
         gap: Gaps, shape (nx, ny) [mm].
-        scale: Largest interference, free motions included [mm].
+        scale: Largest interference, free motions included [mm]; more where a period is so flat
+            that its gaps are rounding.
         residual: Largest violation of the contact conditions, over the scale.
         rounding: Residual that rounding of distances alone can make.
 
@@ -166,6 +167,8 @@ class ActiveSet:
         inside = max(inside, -float(here.min(initial=0.0)))
         # clear of all cells, and yet loaded: the largest absolute value counts
         self.scale = most if most > 0.0 or not loaded.size else max(most, -least)
+        noise = self.problem.noise * float(own.max(initial=0.0))
+        self.scale = max(self.scale, noise / self.problem.tolerance)
         self.residual = self.rounding = 0.0
         self._apart = inside, outside
         if self.scale > 0.0:
@@ -298,6 +301,8 @@ class ActiveSet:
         if self._contact is None or not same:
             self._contact, self._direction = self._among(flat), None
         contact, gap = self._contact, self.gap.take(flat)
+        if self.problem.yields and self.problem.mean_is_free and flat.size == self.gap.size:
+            return contact, gap, self._rise(contact, gap, stop=self._stop(same)), None
         self._quick = quick and contact.accurate
         if not self._quick:
             change = contact.close(gap, stop=self._stop(same), limit=_MOST_ITERATIONS)
@@ -308,6 +313,24 @@ class ActiveSet:
         if self._direction is not None:
             direction += (size / self._direction[1]) * self._direction[0]
         return contact, gap, -self._length * direction, (direction, size)
+
+    def _rise(self, contact: ContactCells, gap: Array, *, stop: float) -> Array:
+        """Return the change of pressures on all cells of a period whose mean nothing resists.
+
+        It evens out the gaps. What is left of them, their mean, then ends where a cell meets its
+        bound.
+
+        Args:
+            contact: The linear problem of all cells.
+            gap: Their gaps, shape (n,) [mm].
+            stop: Largest deviation from the mean that may be left [mm].
+        """
+        mean, old = float(gap.mean()), self.pressure.ravel()
+        change = contact.close(gap - mean, stop=stop, limit=_MOST_ITERATIONS)
+        if abs(mean) <= self.problem.tolerance * self.scale:
+            return change
+        room = self.problem.hardness - old - change if mean < 0.0 else old + change
+        return change - np.copysign(max(0.0, float(room.min())), mean)
 
     def _advance(self, cells: Cells, after: Array, gap: Array, displaced: Displaced) -> None:
         """Go to other pressures of some cells.

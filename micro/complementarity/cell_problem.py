@@ -34,6 +34,7 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
@@ -364,6 +365,8 @@ class _Scaled(NamedTuple):
 _ROUGH = 5e-5
 """Tolerance from which on displacements are evaluated in single precision. That errs by 3e-7 of the
 largest one, which thin layers have a hundred times as large on a half-space."""
+_DIGITS = 4.0 * float(np.finfo(float).eps)
+"""Rounding of displacements in double precision, over those of the longest wave of a period."""
 
 
 class ContactPressures(NamedTuple):
@@ -448,8 +451,25 @@ class CellProblem:
     @property
     def has_no_gap(self) -> bool:
         """Whether no pressures hold a period at a prescribed approach, as it leaves no gap."""
-        prescribed = self.compliance.periodic and not (self.motions.count or self.compliance.own)
-        return prescribed and not self.yields and float(self.interference.mean()) >= 0.0
+        return self.mean_is_free and not self.yields and float(self.interference.mean()) >= 0.0
+
+    @property
+    def mean_is_free(self) -> bool:
+        """Whether nothing resists a mean pressure on all cells: neither a load nor the body."""
+        whole = self.compliance.periodic and self.matrix is None
+        return whole and not (self.motions.count or self.compliance.own)
+
+    @cached_property
+    def noise(self) -> float:
+        """What rounding makes of a period's displacements, over the largest pressure [mm/MPa].
+
+        Without periods it is 0: there rounding is no more than that of the interference.
+        """
+        if not self.compliance.periodic:
+            return 0.0
+        digits = GridCompliance.rounding if self.tolerance >= _ROUGH else _DIGITS
+        longest = float(max(np.multiply(self.interference.shape, self.spacing)))
+        return digits * longest / (math.pi * self.compliance.modulus)
 
     @property
     def yields(self) -> bool:

@@ -573,5 +573,12 @@ class HalfSpaceModel:
 
     def _first_touch(self, tilt: tuple[float, float], depth: Array | None) -> Control:
         """Return the approach at which a plane of given slopes first touches."""
-        plane = RigidPlane.above(self.surface, 0.0, tilt)
-        return Control(approach=-float(self.interference(plane, depth).max()), tilt=tilt)
+
+        def over(approach: float) -> float:
+            plane = RigidPlane.above(self.surface, approach, tilt)
+            return float(self.interference(plane, depth).max())
+
+        approach = -over(0.0)
+        while (rounding := over(approach)) > 0.0:  # of a tilted plane, which would press
+            approach = min(approach - rounding, float(np.nextafter(approach, -np.inf)))
+        return Control(approach=approach, tilt=tilt)

@@ -7,7 +7,7 @@ import pytest
 from helpers.along import respond
 
 from patchlaw import InputError, NotConverged
-from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.micro import MODEL_NAMES, HalfSpaceModel, micro_model, press_along
 
 SPECTRUM = Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=5)
@@ -180,3 +180,18 @@ def test_refuses_to_start_from_other_asperities():
     )
     with pytest.raises(InputError, match="the solution to start from is of other asperities"):
         press(model, start=press(other).start)
+
+
+@pytest.mark.parametrize("hardness", [None, 50.0])
+def test_no_cell_touches_under_no_force(hardness):
+    """A tilted plane at first touch overlapped a cell by rounding: a contact of one cell."""
+    dice = np.random.default_rng(5)
+    for _ in range(40):
+        heights = 1e-2 * dice.standard_normal(dice.integers(4, 25, 2))
+        surface = Surface(heights=heights, lengths=(1.0, 1.3))
+        made = HalfSpaceModel(surface, contact_modulus=1000.0, hardness=hardness)
+        tilt = tuple(dice.uniform(-0.02, 0.02, 2))
+        before = made.press(Control(force=5.0, tilt=tilt))
+        state = made.press(Control(force=0.0, tilt=tilt), start=before.start)
+        assert state.force == 0.0 and state.contact_area == 0.0 and not state.in_contact.any()
+        assert state.gap.min() == pytest.approx(0.0, abs=1e-15)

@@ -110,3 +110,44 @@ def test_a_far_larger_force_is_not_started_from_a_contact_that_cannot_bear_it(se
     assert state.approach == pytest.approx(nothing.approach, rel=2e-8)
     # 1.0 times on both; 1.7 times with the pressures of the smaller force spread over all cells
     assert state.iterations <= 1.25 * nothing.iterations
+
+
+@pytest.mark.parametrize(("cells", "share"), [((9, 14), 1.0), ((18, 18), 0.4), ((5, 8), 0.05)])
+def test_a_flat_period_bears_the_same_pressure_everywhere(cells, share):
+    """Its interference is rounding: what the gaps are left at is small beside displacements."""
+    flat = Surface(heights=np.zeros(cells), lengths=(1.0, 1.3), periodic=True)
+    for hardness in (None, 10.0):
+        made = HalfSpaceModel(flat, contact_modulus=E_STAR, hardness=hardness, periodic=True)
+        start = None
+        for force in (0.1, share * 10.0 * flat.area, 1.0):
+            state = made.press(Control(force=force), start=start)
+            start = state.start
+            np.testing.assert_allclose(state.pressure, force / flat.area, rtol=1e-7)
+            assert state.residual <= made.tolerance and state.contact_area_fraction == 1.0
+    state = made.press(Control(approach=1e-3), start=start)  # beyond full contact
+    assert state.yielding.all()
+    again = made.press(Control(approach=1.5e-3), start=state.start)
+    np.testing.assert_allclose(again.plastic_depth, 1.5e-3, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", [3, 11, 35])
+def test_a_period_that_fits_the_plane_is_pressed_further(seed):
+    """Unloaded from full plasticity all its cells touch below the hardness, at any mean pressure.
+
+    Nothing but the hardness then resists a plane that comes nearer.
+    """
+    dice = np.random.default_rng(seed)
+    heights = 1e-3 * dice.standard_normal(dice.integers(4, 24, 2))
+    surface = Surface(heights=heights, lengths=(1.0, 1.3), periodic=True)
+    made = HalfSpaceModel(surface, contact_modulus=1000.0, hardness=20.0, periodic=True)
+    lowest = surface.highest - float(heights.min())
+    top = made.press(Control(approach=lowest + 5e-4))
+    assert top.yielding.all()
+    for share in (0.9, 0.1):
+        low = made.press(Control(force=share * top.force), start=top.start)
+        assert low.in_contact.all() and not low.yielding.any()
+        for further in (1e-6, 5e-4):
+            state = made.press(Control(approach=top.approach + further), start=low.start)
+            assert state.force == pytest.approx(top.force, rel=1e-7)
+            deeper = state.plastic_depth - top.plastic_depth
+            np.testing.assert_allclose(deeper, further, rtol=1e-5, atol=1e-9)
