@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable
 
 
-LAYOUT = 3
+LAYOUT = 4
 """Counts what states of models hold: higher, whenever the same version reads others than before."""
 
 

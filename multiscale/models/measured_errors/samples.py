@@ -211,7 +211,8 @@ class SampleProbe:
         laws, known = self.table.laws, dict[int, Array]()
         places = [_rounded(law, at) for law, at in zip(laws, closures, strict=True)]
         loads = [float(law.pressure(at)) for law, at in zip(laws, places, strict=True)]
-        names = [("cells", one, law.initial_separation) for one, law in enumerate(laws)]
+        # as samples wear, their laws begin later, at the same separation
+        names = [("cells", one, law.first_touch) for one, law in enumerate(laws)]
         for number in np.flatnonzero(forces > 0.0).tolist():
             before = self.recalled(names[number], loads[number], KEPT * NEAR, NEAR)
             if before is not None:

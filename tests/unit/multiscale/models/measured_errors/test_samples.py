@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -366,6 +367,31 @@ def test_errors_are_recalled_of_the_nearest_load_and_only_where_they_are_known()
     ]
     assert found == [None, 3.0, 3.0, 2.0, None]
     assert SampleProbe.recalled(probe, "cells", 2.9, 2.0, 1.0) is None  # from lower loads alone
+
+
+def test_errors_of_cells_are_not_kept_for_samples_that_have_worn_since():
+    measured = []
+
+    def of_regions(what, tell, some):
+        measured.append(list(some))
+        yield 0, np.ones((1, 13)), np.ones(1)
+
+    probe = SimpleNamespace(told=[], samples=[SimpleNamespace(surfaces=[SimpleNamespace(area=1)])])
+    probe.recalled = partial(SampleProbe.recalled, probe)
+    probe.tell_later = partial(SampleProbe.tell_later, probe)
+    probe._told_by, probe.of_regions = math.nan.__add__, of_regions
+    for touch, load in ((0.0, 1.0), (0.0, 1.5), (0.1, 1.5), (0.1, 1.6)):
+        law = SimpleNamespace(
+            first_touch=touch,
+            initial_separation=1.0,
+            range=(0.0, 4.0),
+            pressure=lambda closure: np.asarray(closure, dtype=float),
+            closure_under=float,
+            at=lambda closure, extend: SimpleNamespace(separation=1.0),
+        )
+        probe.table = SimpleNamespace(laws=[law])
+        SampleProbe.of_cells(probe, np.array([load]), np.ones(1), np.zeros(1))
+    assert measured == [[True], [False], [True], [False]]
 
 
 def test_other_elements_whose_contact_fails_are_not_used_again():
