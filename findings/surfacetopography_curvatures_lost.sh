@@ -3,8 +3,7 @@
 #
 # Guess: it has as many distances whatever the sides are; distances grow with them, curvatures fall with their square.
 # Seen: of the same heights of 128 × 128 points there are 20 distances with sides of 1 and 2, and one, without a word, with sides of 3 to 300: what is
-# left depends on the unit of lengths. Periodic, 16 distances up to sides of 4, one of 5. Slopes keep theirs. With resampling_method=None there are all 63.
-# Scale the map to sides of 1 before, or ask without resampling.
+# left depends on the unit of lengths. Periodic, 16 distances up to sides of 4, one of 5. Slopes keep theirs. With resampling_method=None all are there, 63 and 31.
 set -euo pipefail
 source "$(dirname "$0")/packages.sh" SurfaceTopography==1.27.1 scipy==1.17.1
 python - <<'END'
