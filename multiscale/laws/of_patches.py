@@ -49,6 +49,10 @@ the mean, its closure is larger than those of all rows. On eight scenes of the p
 64 patches, level and tilted, on a cube and a column) seven left their laws with 0.02, two with 0.25
 and none with 0.5."""
 
+_FURTHER, _FURTHEST = 2.0, 20.0
+"""Factor on the way of rows that end too early, and the longest over that to the largest load. Near
+full contact closure hardly grows with the approach, and points need long ways."""
+
 _ROWS_TOGETHER = 2
 """Rows that one rank solves in sequence, each starting from the one before: results then do not
 depend on the number of ranks. On 64² to 256² cells it takes up to 7 % more iterations than 4, which
@@ -71,6 +75,7 @@ def consistent_laws(
     largest: Control,
     displacements: Displacements | None = None,
     pointwise: bool = False,
+    before: LawTable | None = None,
     tolerance: float = 2e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
@@ -93,6 +98,7 @@ def consistent_laws(
             by default those of a half-space. Collective.
         pointwise: Whether the macro model evaluates the laws at points, where closures exceed the
             means of the rows.
+        before: Laws of the same surface that end too early. Their rows stay, and others follow.
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
         comm: MPI communicator, whose ranks share the rows. The table does not depend on their
@@ -100,7 +106,7 @@ def consistent_laws(
         observe: Called as rows are solved.
 
     Returns:
-        All laws, on every rank.
+        All laws, on every rank; `before` where it goes as far as laws may.
 
     Raises:
         NotConverged: When the micro model does not converge.
@@ -119,13 +125,23 @@ def consistent_laws(
         observe=lambda rows: (observe or unobserved)("rows of laws", rows, most_rows),
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
-    end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
+    way, reserve, earlier = max(end - first, 0.0), _RESERVE, None
+    if pointwise:
+        reserve = _POINTWISE_RESERVE
+    if before is not None:
+        assert before.path is not None, "laws of patches together have a path"
+        earlier = before.path.approach
+        further = _FURTHER * float(earlier[-1] - first)
+        if not way or further > _FURTHEST * way:
+            return before
+        reserve = further / way - 1.0
+    end += reserve * way
     last = Control(approach=end, tilt=largest.tilt)
     quick = model.quick_up_to(last, _ROW_ERROR * tolerance, sums_alone=True)
     if quick is not None:
         whole = replace(whole, model=quick, quick=True)
     make = RowMaker(whole.rows, curves_from_touch, compliance, whole.initial_separation)
-    made = refined(make, first, end, tolerance, most_rows)
+    made = refined(make, first, end, tolerance, most_rows, earlier)
     return LawTable(
         patches=patches,
         laws=tuple(whole.laws(made)),

@@ -146,7 +146,12 @@ def _worst(errors: Array) -> Array:
 
 
 def refined(
-    make: RowMaker, start: float, end: float, tolerance: float, most_rows: int = MOST_ROWS
+    make: RowMaker,
+    start: float,
+    end: float,
+    tolerance: float,
+    most_rows: int = MOST_ROWS,
+    earlier: Array | None = None,
 ) -> Refined:
     """Solve rows, and halve the intervals of largest error until all errors are small enough.
 
@@ -162,9 +167,13 @@ def refined(
         tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
             `errors_at`.
         most_rows: Rows that may be solved, 9 at least. The errors then state what was reached.
+        earlier: Approaches of the rows of laws that end before, from first touch on [mm]; they stay
+            rows, however many there may be.
     """
     solve, curves, compliance, initial_separation = make
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
+    if earlier is not None:
+        approaches = np.append(earlier, approaches[approaches > earlier[-1]])
     rows = solve(approaches if end > start else approaches[-1:])
     patches = rows.pressure.shape[1]
     if end <= start or not rows.pressure[-1].any():

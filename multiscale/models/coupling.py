@@ -36,9 +36,17 @@ from patchlaw.multiscale.scene.memory import (
 from patchlaw.multiscale.scene.parts import SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support import Array, located
-from patchlaw.support.readable import Detail, ProgressObserver, number, percent, quantity
+from patchlaw.support.readable import (
+    Detail,
+    ProgressObserver,
+    number,
+    percent,
+    quantity,
+    unobserved,
+)
 
-if TYPE_CHECKING:  # only laws take it
+if TYPE_CHECKING:  # only laws take them
+    from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
     from patchlaw.multiscale.laws.law_table import LawTable
 
 
@@ -336,9 +344,30 @@ class Coupling(ABC):
                 self.table = made.with_stiffness_ratios(self._stiffness_ratios())
         return self.table
 
-    def _make_table(self, observe: ProgressObserver) -> LawTable:
-        """Tabulate the laws; collective."""
+    def _make_table(self, observe: ProgressObserver, before: LawTable | None = None) -> LawTable:
+        """Tabulate the laws; collective.
+
+        Args:
+            observe: Told of rows as they are made.
+            before: Laws that end too early; where they cannot go further they come back.
+        """
         raise NotImplementedError
+
+    def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
+        """Return a contact face with the laws on it."""
+        raise NotImplementedError
+
+    def _longer(self, table: LawTable) -> tuple[LawContactProblem, LawTable] | None:
+        """Return laws that go further, on the contact face; None where none do; collective."""
+        longer = self._make_table(unobserved, table)
+        if longer is table:
+            return None
+        self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
+        self.extensions.append(
+            f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
+            "needed"
+        )
+        return self._problem(self.bodies.contact_face, longer), longer
 
     def _stiffness_ratios(self) -> list[float]:
         """Return Mindlin's ratio of the bodies for every law."""

@@ -36,6 +36,8 @@ class FaceContact(LawModel):
         face: The patches on its contact face.
         wear: Depths that wear off per distance slid and pressure, one for every law, (N,) [mm²/N];
             None: nothing wears.
+        longer: Returns laws that go further than these, and the body with them on its contact face;
+            None where that cannot be. Collective.
 
     Attributes:
         face: The patches on its contact face.
@@ -53,8 +55,10 @@ class FaceContact(LawModel):
         table: LawTable,
         face: LoadedFace | FacePair,
         wear: Array | None = None,
+        longer: Callable[[LawTable], tuple[LawContactProblem, LawTable] | None] | None = None,
     ) -> None:
         super().__init__(table)
+        self._longer = longer or (lambda table: None)
         self._wear, self.wears = wear, wear is not None
         self._slid = Slid()
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
@@ -239,15 +243,32 @@ class FaceContact(LawModel):
         return self._problem.sliders and self._problem.sliders.memory
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Model.press`."""
-        before, slips = self.past, self.slips
-        try:
-            step = self._pressed(control)
-        except Exception:
-            self.past = before
-            raise
-        self.slips_before = slips
-        return step
+        """Solve one load step, with longer laws where these end too early; see `Model.press`."""
+        while True:
+            before, slips = self.past, self.slips
+            try:
+                step = self._pressed(control)
+            except BeyondLaws:
+                self.past = before
+                if (longer := self._longer(self.table)) is None:
+                    raise
+                self._go_on_with(*longer)
+            except Exception:
+                self.past = before
+                raise
+            else:
+                self.slips_before = slips
+                return step
+
+    def _go_on_with(self, problem: LawContactProblem, table: LawTable) -> None:
+        """Take longer laws, under which the latest load step is found again."""
+        last, shorter = self.state(), self._problem
+        self._take(problem, table)
+        if self._problem.sliders and shorter.sliders:
+            self._problem.sliders.follow(shorter.sliders)
+        self._problem.forces.worn = shorter.forces.worn
+        if last is not None:
+            self._solve_again(last)
 
     def _pressed(self, control: Control) -> LoadStep:
         try:
@@ -357,7 +378,13 @@ class FaceContact(LawModel):
         } | ({} if rubs is None else {"dissipated_mJ": float(np.sum(rubs * self._slid.forces))})
 
     def stiffness(self) -> NormalStiffness:
-        """Return −dF/dū and dF/dδ at the latest load step, by one linear solve."""
+        """Return −dF/dū and dF/dδ at the latest load step, by one linear solve.
+
+        On faces without patches −dF/dū alone, the integral of −dp/dū of the laws over the face.
+        """
+        if not isinstance(self.table.patches, PatchGrid):
+            rates = self._problem.patch_means(self._stiffness_at)
+            return NormalStiffness(float(rates @ self.face.areas))
         try:
             to = self._problem.approach_response()
         except NotConverged as error:
@@ -503,47 +530,3 @@ class FaceContact(LawModel):
             "areas": areas,
             "peak_pressure_MPa": float(peaks.max()),
         }
-
-
-class ExtendedFaceContact(FaceContact):
-    """Laws of samples at the points of a face; they are extended where a load step needs it.
-
-    Args:
-        problem_of: Returns the body with laws on its contact face.
-        table: The laws.
-        face: The contact face.
-        longer: Returns laws that go further than these; None where that cannot be.
-        wear: As of `FaceContact`.
-    """
-
-    def __init__(
-        self,
-        problem_of: Callable[[LawTable], LawContactProblem],
-        table: LawTable,
-        face: LoadedFace | FacePair,
-        longer: Callable[[LawTable], LawTable | None],
-        wear: Array | None = None,
-    ) -> None:
-        super().__init__(problem_of(table), table, face, wear)
-        self._problem_of, self._longer = problem_of, longer
-
-    def stiffness(self) -> NormalStiffness:
-        """Return the integral of −dp/dū of the laws over the face at the latest load step."""
-        rates = self._problem.patch_means(self._stiffness_at)
-        return NormalStiffness(float(rates @ self.face.areas))
-
-    def press(self, control: Control) -> LoadStep:
-        """Solve one load step, with longer laws where these end too early."""
-        while True:
-            try:
-                return super().press(control)
-            except BeyondLaws:
-                if (longer := self._longer(self.table)) is None:
-                    raise
-                last, shorter = self.state(), self._problem
-                self._take(self._problem_of(longer), longer)
-                if self._problem.sliders and shorter.sliders:
-                    self._problem.sliders.follow(shorter.sliders)
-                self._problem.forces.worn = shorter.forces.worn
-                if last is not None:
-                    self._solve_again(last)

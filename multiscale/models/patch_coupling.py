@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,8 +27,11 @@ from patchlaw.multiscale.models.cell_coupling import CellCoupling, as_worn
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import PatchContact, PathContact
 from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
-from patchlaw.support import Array, on_root, on_root_alone
+from patchlaw.support import Array, NotConverged, on_root, on_root_alone
 from patchlaw.support.readable import ProgressObserver, times, unobserved
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
@@ -107,16 +110,30 @@ class PatchCoupling(CellCoupling):
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
         if self.table is None and not self.scene.patches_alone:
-            self._model = self.model_on_body()  # in a phase of its own
+            _ = self._model  # in a phase of its own
         return super().make_laws()
 
-    def _make_table(self, observe: ProgressObserver) -> LawTable:
+    @cached_property
+    def _model(self) -> MicroModel:
+        """The micro model that laws are made with, on the body."""
+        return self.model_on_body()
+
+    def _make_table(self, observe: ProgressObserver, before: LawTable | None = None) -> LawTable:
+        if before is not None and self.scene.patches_alone:  # no point comes further than the plane
+            return before
         options = self._options(observe)
         if self.scene.patches_alone:
             ends, love = self.parts.largest_closures + self._rise(), self.scene.coupling.love
             alone, patches = self.model_alone(), self.parts.patches
             return isolated_laws(alone, patches, closure_ends=ends, love=love, **options)
-        table = self._consistent(self._model, self._largest_control(), **options)
+        try:
+            table = self._consistent(self._model, self._largest_control(), before=before, **options)
+        except NotConverged:
+            if before is None:
+                raise
+            return before  # no pressure presses the surface further, as at its hardness
+        if table is before:
+            return table
         return self._with_leak(table, self._model, None, self._largest_control())
 
     def _options(self, observe: ProgressObserver = unobserved) -> dict[str, Any]:
@@ -301,13 +318,16 @@ class PatchCoupling(CellCoupling):
             return PathContact(table, moved, tilt, wear=wear, friction=rubbed, face=face)
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
+        face = self.bodies.contact_face
+        return FaceContact(self._problem(face, table), table, face, longer=self._longer)
+
+    def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
+        """Return a contact face with the laws on it, or at its points."""
         from patchlaw.macro import LawContactProblem
 
-        face = self.bodies.contact_face
         mode, rubs = self.scene.coupling.interface, self.scene.friction
         friction = Friction(coefficient=rubs.coefficient) if rubs else None
-        problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        return FaceContact(problem, table, face)
+        return LawContactProblem(face, table.together(), mode=mode, friction=friction)
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""

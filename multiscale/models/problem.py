@@ -278,8 +278,8 @@ class LawModel(Model):
             )
         elif self.face is not None and any(one.is_preloaded for one in self.meshed_bodies):
             remedy = (
-                "loads of the body shift the pressures further than the laws were made for: take "
-                "law.kind = 'representative', whose laws are extended, or a smaller load"
+                "loads of the body shift the pressures further than laws can be made for: take "
+                "law.kind = 'representative' or a smaller load"
             )
         else:
             remedy = (

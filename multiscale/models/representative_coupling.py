@@ -30,7 +30,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
+from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
 from patchlaw.multiscale.models.measured_errors.faces import (
     LawErrorProbe,
@@ -43,7 +43,7 @@ from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth
 from patchlaw.support import Array, located, shared
-from patchlaw.support.readable import ProgressObserver, number, times, unobserved
+from patchlaw.support.readable import ProgressObserver, times, unobserved
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
@@ -119,7 +119,7 @@ class RepresentativeCoupling(Coupling):
     ) -> dict[str, Any]:
         """Measure the errors of a load step, by further steps on the same bodies."""
         model = self.model
-        assert isinstance(model, ExtendedFaceContact)
+        assert isinstance(model, FaceContact)
         problem, state = model.solved
         stiffness = step.interface_stiffness_N_per_mm or model.stiffness().interface
         known: dict[str, Any] = {
@@ -160,7 +160,7 @@ class RepresentativeCoupling(Coupling):
             found = found.with_wear(step, past, of_wear)
         return error_columns(step, found)
 
-    def _as_worn(self, model: ExtendedFaceContact) -> dict[str, Any]:
+    def _as_worn(self, model: FaceContact) -> dict[str, Any]:
         """Return laws, samples and problems of a worn face, by names that `LawErrorProbe` has."""
         table, (problem, state) = model.table, model.solved
         areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
@@ -417,8 +417,8 @@ class RepresentativeCoupling(Coupling):
         if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
             new = self._make_table()
             table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())
-        problem_of = partial(self._problem, face)
-        made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
+        problem = self._problem(face, table)
+        made = FaceContact(problem, table, face, self.law_wear, self._longer)
         made.further_fields = self.further_fields
         if self.scene.loading.slides and self.scene.friction is not None:
             made.rubs = np.array(self.scene.coefficients)
@@ -436,18 +436,6 @@ class RepresentativeCoupling(Coupling):
             crown=crown_depth(self.scene, self.parts.body.lengths),
             friction=[Friction(coefficient=one) for one in coefficients] or None,
         )
-
-    def _longer(self, table: LawTable) -> LawTable | None:
-        """Return the laws extended; None where they end as far as possible."""
-        longer = self._make_table(before=table)
-        if longer is table:
-            return None
-        self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
-        self.extensions.append(
-            f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
-            "needed"
-        )
-        return longer
 
 
 def _last(law: PatchLaw) -> float:
