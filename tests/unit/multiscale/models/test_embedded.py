@@ -90,5 +90,5 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
 def test_remedy_beyond_the_law_of_a_sample_names_its_range():
     made_by = {"coupling": "representative"}
     table = LawTable(patches=PATCHES, laws=(law(), law(0.5)), made_by=made_by)
-    with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .* almost the hardness or"):
+    with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .* 95 % of the hardness"):
         FaceContact(EasyBlock(table.together()), table, face=None).press(Control(approach=8.0))

@@ -78,7 +78,7 @@ def test_what_no_law_bears_is_refused_with_a_remedy_that_helps():
     soft = Scene.from_dict(SCENE).with_(
         {"law.seeds": [1], "micro.hardness": "25 MPa", "law.largest_pressure": "5 MPa"}
     )
-    with pytest.raises(NotConverged, match=r"LAW_RANGE.*almost the hardness.*take a smaller load"):
+    with pytest.raises(NotConverged, match=r"LAW_RANGE.*95 % of the hardness.*take a smaller load"):
         run(soft)
 
 
