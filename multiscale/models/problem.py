@@ -262,8 +262,8 @@ class LawModel(Model):
         made_by = self.table.made_by.get("coupling")
         if made_by == "representative":
             remedy = (
-                "somewhere on the face the pressure is larger than any that laws are made for: they "
-                "end where the plane reaches the mean plane of the sample, or at 95 % of the "
+                "somewhere on the face the pressure is larger than any that laws are made for; "
+                "these end where the plane reaches the mean plane of the sample, or at 95 % of the "
                 "hardness: take a smaller load"
             )
         elif made_by != "consistent":
