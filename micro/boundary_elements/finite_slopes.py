@@ -17,23 +17,18 @@ grows by the forms
 u(t) = (1/Gk) (t − ν k (k · t)/k²) the displacement by tangential tractions (Cerruti). The first is
 also what Eshelby's energy-momentum tensor gives. Both are symmetric, and on a half-space they do
 not change when h does by a constant. A finite body changes with its height: the first order takes
-heights from the plane of the flat body.
+heights from the plane of the flat body. The second, which takes its tractions as on a half-space,
+takes them from the top, where they are smallest under the loads.
 
 Beside the sides of a body, displacements by tangential tractions and curvatures are not those of a
 half-space. The second order of constant heights was then not 0 there: of loads that change from
 cell to cell along a side it was −1.4 of their displacement with heights of two cells, where no
-iteration converges. With the strains E τ by tractions ∂_α τ_αβ, which is a symmetric operator with
-κ = E σ on the half-space, it is for p' = p
+iteration converges. So heights count from those of the loads there. With stresses τ and curvatures
+λ by pressures h p it is, for p' = p,
 
-    ∫ (h² σ : E σ − h σ : E(h σ)) dA = ½ ∬ (h − h')² σ : E σ' dA dA',
+    ∫ (h² σ : κ − 2 h σ : λ + τ : λ + t · u(t)) dA,    t_β = ∂_α (h σ_αβ − τ_αβ),
 
-which counts nothing but differences of heights, whatever the stresses are.
-
-Stresses end at the sides, and so have waves of all lengths. A kernel of E that ends sharply at the
-shortest wave of cells falls off as slowly as 1/r, alternating from cell to cell. Times the squares
-of differences of heights it made the second order of loads on the outermost cells grow with the
-number of cells, and corners far below the plane gave way. Beyond the waves that pressures have, E
-therefore falls to 0 smoothly.
+which is 0 for constant heights, and the form above on a half-space.
 
 The first order does not change by constant heights either, where stresses are exact. At the corners
 of a body those at the centres of cells miss 16 % of it under loads on single cells: times a depth
@@ -41,7 +36,9 @@ of ten cells, 0.8 of their displacement. No load had then an end to its growth t
 corners came to 60 times the pressure of all others. So, where heights are deep against cells, loads
 that vary from cell to cell count heights from their own in the first order, too. With the
 displacement D p = p/E − (σ : e(σ') by p'), which a unit of height takes off, and what B keeps of a
-field that varies slowly, ∫ h p D p dA becomes ∫ (B h p) D (B p) dA.
+field that varies slowly, ∫ h p D p dA becomes ∫ (B h p) D (B p) dA. The second order is there that
+of B p and B h p: loads on single cells at sides had one that grows as the square of a depth, and
+made corners give way that lie 20 cells deep.
 
 Heights of either sign are those of a possible body: as a function of a factor on the heights the
 compliance has no singularity on the real axis. The orders are summed as a₁ + a₂/(1 + (a₂/a₁)²), the
@@ -98,8 +95,7 @@ class Waves:
         shown: Coarse cells (sx, sy) that fields have: those of the torus, or of the rectangle with
             nothing around it.
         wave_number: |k| of the waves, each for its real and its imaginary part: a product of reals
-            is quicker than one with complex numbers. Shape (mx, 2 (my // 2 + 1)) [1/mm]. With
-            nothing around the rectangle it falls to 0 beyond the waves that pressures have.
+            is quicker than one with complex numbers. Shape (mx, 2 (my // 2 + 1)) [1/mm].
         directions: k_x²/|k|², k_y²/|k|² and k_x k_y/|k|² likewise, shape (3, mx, 2 (my // 2 + 1));
             their means over all directions where k = 0.
     """
@@ -120,11 +116,7 @@ class Waves:
         self._beyond = [(0, more - own) for more, own in zip(self.shown, coarse, strict=True)]
         kx = 2.0 * np.pi * fft.fftfreq(self.padded[0], self.spacing[0])[:, None]
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
-        length = np.hypot(kx, ky)
-        if around == "nothing":
-            shares = np.hypot(*(k / np.abs(k).max() for k in (kx, ky)))
-            length *= 0.5 - 0.5 * np.cos(np.pi * np.clip((1.0 - shares) / (1.0 - _LAST), 0.0, 1.0))
-        self.wave_number = np.repeat(length, 2, axis=-1)
+        self.wave_number = np.repeat(np.hypot(kx, ky), 2, axis=-1)
         products = np.stack(np.broadcast_arrays(kx * kx, ky * ky, kx * ky))
         trace = products[0] + products[1]
         directions = np.divide(products, trace, out=products, where=trace > 0.0)
@@ -291,10 +283,8 @@ class SurfaceStress(Protocol):
 
 _DEEP = 8.0
 """Range of heights, in cells, from which on loads that vary from cell to cell count heights from
-their own in the first order, too. A force with a range of 15 cells changes by 1.6e-5."""
-_LAST = 0.9
-"""Wave number over the largest of coarse cells, up to which that of waves with nothing around them
-is as it is; pressures have none beyond."""
+their own in the first order, too, which changes a force with a range of 15 cells by 1.6e-5, and have
+no second order."""
 _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 """Of xx, yy and xy, as yx is there too."""
 
@@ -307,15 +297,14 @@ class _Orders(NamedTuple):
         works: What the form of first order multiplies them by, with heights from the top.
         value: Value of the form of second order.
         first: What the form of first order multiplies pressures and stresses by, (4, sx, sy).
-        second: What that of second order multiplies stresses by, (3, sx, sy), and curvatures,
-            (k, 3, sx, sy).
+        second: What that of second order multiplies stresses and curvatures by, (k, 6, sx, sy).
     """
 
     fields: Array
     works: Array
     value: float
     first: Array
-    second: tuple[Array, Array]
+    second: Array
 
 
 class FiniteSlopes:
@@ -328,8 +317,9 @@ class FiniteSlopes:
     Moving all heights by a constant changes nothing under loads much shorter than the body.
     Stresses at the centres of cells beside a free side keep to this only where loads vary little
     from cell to cell: otherwise what is left of the form, times a height much larger than a cell,
-    exceeds the compliance of the cells itself. Beside free sides heights of quick loads therefore
-    count from their own in the first order, where they are deep against the cells.
+    exceeds the compliance of the cells itself. Beside free sides heights therefore count from those
+    of the loads, in the first order where they are deep against the cells; these loads have no
+    second order there.
 
     Args:
         surface: The surface.
@@ -397,11 +387,15 @@ class FiniteSlopes:
         loaded = self.coarsened(pressure)
         orders = self._orders(loaded)
         share = second_share(float(np.vdot(orders.fields, orders.works)), orders.value)
-        stressed, bent = orders.second
-        bent *= share
-        weights = share * stressed + orders.first[1:]
-        (moved,) = self._moved(orders.first[:1], weights[None], bent)
-        return self.refined(moved + self._from_loads(loaded))
+        if self._slow is not None:
+            first, second = self._displaced_by(loaded, orders)
+            return self.refined(first + share * second)
+        second = orders.second
+        second *= share
+        second[0, :3] += orders.first[1:]
+        pushed = np.zeros((len(second), *second.shape[2:]))
+        pushed[0] = orders.first[0]
+        return self.refined(self._with_heights(self._moved(pushed, second[:, :3], second[:, 3:])))
 
     def coarsened(self, field: Array) -> Array:
         """Return a field of all cells, (nx, ny), on those that the term works on, (cx, cy)."""
@@ -423,11 +417,15 @@ class FiniteSlopes:
             order, with heights from the top.
         """
         orders = self._orders(loaded)
-        stressed, bent = orders.second
-        pushed = np.stack([orders.first[0], np.zeros_like(orders.first[0])])
-        moved = self._moved(pushed, np.stack([orders.first[1:], stressed]), bent)
-        moved[0] += self._from_loads(loaded)
-        return moved, orders.fields, orders.works
+        return self._displaced_by(loaded, orders), orders.fields, orders.works
+
+    def _displaced_by(self, loaded: Array, orders: _Orders) -> Array:
+        """Return what pressures displace in either order, by its parts, shape (2, cx, cy)."""
+        weights = np.concatenate([orders.first[None, 1:], orders.second[:, :3]])
+        pushed = np.zeros((len(weights), *weights.shape[2:]))
+        pushed[0] = orders.first[0]
+        moved = self._moved(pushed, weights, orders.second[:, 3:])
+        return np.stack([moved[0] + self._from_loads(loaded), self._with_heights(moved[1:])])
 
     def _from_loads(self, loaded: Array) -> Array | float:
         """Return what the first order adds as quick loads count heights from their own, (cx, cy).
@@ -453,9 +451,9 @@ class FiniteSlopes:
         """Return the parts of both orders by pressures on the coarse cells, shape (cx, cy)."""
         modulus, below = self.material.young_modulus, self._below
         loaded = self._waves.alone(loaded)
-        directed, curvatures = self._directed(loaded, curved=not self.edge_stresses)
+        directed, curvatures = self._directed(loaded)
         stresses = self._stresses(loaded, directed)
-        value, second = self._second(stresses, curvatures)
+        value, second = self._second(loaded, stresses, curvatures)
         parts = np.concatenate([loaded[None] / modulus, -_TWICE_SHEAR * self._strains(stresses)])
         return _Orders(
             fields=np.concatenate([loaded[None], stresses]),
@@ -506,12 +504,12 @@ class FiniteSlopes:
         """
         waves, nu = self._waves, self.material.poisson_ratio
         below, loaded = self._below, waves.alone(waves.coarsened(pressure))
-        directed, curvatures = self._directed(loaded, curved=not self.edge_stresses)
+        directed, curvatures = self._directed(loaded)
         stresses = self._stresses(loaded, directed)
         of_load = loaded**2 / self.material.young_modulus
         of_stresses = _product(stresses, self._strains(stresses))
         first = abs(float(np.sum(below * (of_load - of_stresses))))
-        second = abs(self._second(stresses, curvatures)[0])
+        second = abs(self._second(loaded, stresses, curvatures)[0])
         along, across = directed
         near = np.sqrt(along**2 + (loaded - along) ** 2 + 2.0 * across**2)
         around = below if self.edge_stresses else np.pad(below, 1, mode="wrap")
@@ -549,32 +547,52 @@ class FiniteSlopes:
         """Return the same slopes of a periodic surface on a body that cannot widen."""
         return FiniteSlopes(self.surface, self.material, periodic=True, grid=self.grid, held=True)
 
-    def _second(self, stresses: Array, curvatures: Array) -> tuple[float, tuple[Array, Array]]:
+    def _second(self, loaded: Array, stresses: Array, curvatures: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses and curvatures.
 
         Args:
-            stresses: The stresses by the pressures, shape (3, sx, sy).
-            curvatures: The curvatures of the displacements by them; beside free sides none.
+            loaded: The pressures p, shape (sx, sy).
+            stresses: The stresses by them.
+            curvatures: The curvatures of the displacements by them.
 
         Returns:
-            The value, and what stresses are multiplied by, (3, sx, sy), and curvatures, (1, 3, sx,
-            sy), or beside free sides (0, 3, sx, sy).
+            The value, and what stresses and curvatures are multiplied by, shape (k, 6, sx, sy):
+            those by p, and beside free sides those by h p, too; both without quick loads where
+            heights are deep.
         """
-        below, moments = self._below, self._below * stresses
-        if self.edge_stresses:
-            fields = np.concatenate([stresses, moments, below * moments])
-            parts = self._waves.changed(fields, self._strained, len(fields))
-            curvatures, strains, weights = np.split(parts, 3)
-            weights *= 0.5
-            bent = np.zeros((0, *stresses.shape))
-        else:
-            strains = self._waves.changed(moments, self._strained, 3)
-            weights, bent = np.zeros_like(stresses), 0.5 * below * moments[None]
-        value = float(np.sum(_product(moments, below * curvatures - strains)))
-        weights += below * (0.5 * below * curvatures - strains)
-        weights[2] *= 2.0  # of xy, as yx is there too
-        bent[:, 2] *= 2.0
-        return value, (weights, bent)
+        below, edges = self._below, bool(self.edge_stresses)
+        raised = below * loaded
+        if self._slow is not None:
+            loaded, raised = self._slow(np.stack([loaded, raised]))
+            directed, curvatures = self._directed(loaded)
+            stresses = self._stresses(loaded, directed)
+        weights = np.empty((1 + edges, 6, *loaded.shape))
+        of_stresses, of_curvatures = weights[:, :3], weights[:, 3:]
+        moments, bent = below * stresses, below * curvatures
+        value = float(np.sum(_product(moments, bent)))
+        np.multiply(0.5 * below, bent, out=of_stresses[0])
+        np.multiply(0.5 * below, moments, out=of_curvatures[0])
+        if edges:
+            directed, curved = self._directed(raised)
+            stressed = self._stresses(raised, directed)
+            value += float(np.sum(_product(stressed - 2.0 * moments, curved)))
+            of_stresses[0] -= below * curved
+            np.multiply(0.5, curved, out=of_stresses[1])
+            np.subtract(0.5 * stressed, moments, out=of_curvatures[1])
+            moments -= stressed
+        strains = self._waves.changed(moments, self._strained, 3)
+        value -= float(np.sum(_product(moments, strains)))
+        of_stresses[0] -= below * strains
+        if edges:
+            of_stresses[1] += strains
+        weights[:, 2::3] *= 2.0  # of xy, as yx is there too
+        return value, weights
+
+    def _with_heights(self, moved: Array) -> Array:
+        """Return the displacement by weights of p, plus h times that by weights of h p, if any."""
+        if self._slow is not None:
+            moved = self._slow(moved)
+        return np.asarray(moved[0] + self._below * moved[1] if self.edge_stresses else moved[0])
 
     def _stresses(self, pressure: Array, directed: Array) -> Array:
         """Return σ_xx, σ_yy, σ_xy by pressures.
@@ -618,8 +636,8 @@ class FiniteSlopes:
         """Return the waves of strains by tractions ∂_α (h σ_αβ), by those of moments h σ_αβ."""
         nu, factor = self.material.poisson_ratio, -1.0 / self.material.shear_modulus
         along, _, across = self._waves.directions[:, :, here]
-        xx, yy, xy = tensors = waves.reshape(-1, 3, *waves.shape[1:]).swapaxes(0, 1)
-        parts = np.empty_like(tensors)
+        xx, yy, xy = waves
+        parts = np.empty_like(waves)
         crossed, straight = across * xy, along * (xx - yy)
         straight += yy
         # k · m k/k², as the trace of k k/k² is 1: that of the strains over 1 − ν
@@ -635,7 +653,7 @@ class FiniteSlopes:
         straight -= both
         np.subtract(straight, parts[0], out=parts[1])
         parts *= self._waves.wave_number[:, here] * factor
-        return parts.swapaxes(0, 1).reshape(waves.shape)
+        return parts
 
     def _displaced(self, count: int, waves: Array, here: slice) -> Array:
         """Return the waves of the displacements by those of tensors, of which some are added last.

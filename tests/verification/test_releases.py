@@ -19,7 +19,7 @@ FORCES = {
     "embedded": (["patches.grid=[4, 2]"], [0.5591384826747613, 2.4175091443148617]),
     "concurrent": (
         ["coupling.kind=concurrent", "micro.model=half-space"],
-        [0.6126601653590888, 2.945169874259148],
+        [0.6125249040556763, 2.9439139574577693],
     ),
 }
 

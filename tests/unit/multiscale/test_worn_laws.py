@@ -253,15 +253,13 @@ def test_laws_of_patches_wear_and_yield_as_their_cells():
     changes = {"micro": {"hardness": "3 GPa"}, "output": quiet}
     laws, cells = (run(of_patches(kind, **changes)) for kind in ("consistent", "concurrent"))
     elastic = run(of_patches("concurrent", output=quiet))
-    for name, first, share in (  # at first few of 20² cells touch
-        ("approach_mm", 0.01, 2e-3),
-        ("contact_area_fraction", 0.12, 0.01),
-        ("mean_separation_mm", 4e-3, 1e-3),
-        ("worn_volume_mm3", 1e-9, 1e-9),
+    for name, share in (
+        ("approach_mm", 2e-3),
+        ("contact_area_fraction", 0.01),
+        ("mean_separation_mm", 1e-3),
+        ("worn_volume_mm3", 1e-9),
     ):
-        given, true = getattr(laws, name), getattr(cells, name)
-        np.testing.assert_allclose(given, true, first, err_msg=name)
-        np.testing.assert_allclose(given[1:], true[1:], share, err_msg=name)
+        np.testing.assert_allclose(getattr(laws, name), getattr(cells, name), share, err_msg=name)
     assert laws.approach_mm[-1] > 1.01 * elastic.approach_mm[-1]
 
 
