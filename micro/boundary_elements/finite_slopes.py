@@ -283,8 +283,8 @@ class SurfaceStress(Protocol):
 
 _DEEP = 8.0
 """Range of heights, in cells, from which on loads that vary from cell to cell count heights from
-their own in the first order, too, which changes a force with a range of 15 cells by 1.6e-5, and have
-no second order."""
+their own in the first order, too, and have no second one. The first changes a force with a range of
+15 cells by 1.6e-5."""
 _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 """Of xx, yy and xy, as yx is there too."""
 
