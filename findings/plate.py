@@ -22,7 +22,10 @@ def plate(n):
     top = np.vstack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     rim = np.concatenate([place[:-1, 0], place[-1, :-1], place[:0:-1, -1], place[0, :0:-1]])
     after = np.roll(rim, -1)
-    sides = [np.stack([rim, rim + n * n, after + n * n], 1), np.stack([rim, after + n * n, after], 1)]
+    sides = [
+        np.stack([rim, rim + n * n, after + n * n], 1),
+        np.stack([rim, after + n * n, after], 1),
+    ]
     return points, np.vstack([top, top[:, ::-1] + n * n, *sides])
 
 
